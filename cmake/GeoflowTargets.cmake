@@ -1,0 +1,71 @@
+# Compiler settings shared by every target, and the functions that declare a part, its tests and its fuzz targets.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_C_STANDARD 11)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+endif()
+
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(tl-expected REQUIRED)
+
+add_library(geoflow_options INTERFACE)
+target_compile_options(geoflow_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wold-style-cast -Wnon-virtual-dtor
+  -Woverloaded-virtual -Wcast-align -Wnull-dereference -Wdouble-promotion -Werror
+  -fno-math-errno -fstack-protector-strong
+  $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond;-Wlogical-op>
+  $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
+# fmt 9 and GCC 12's optimiser disagree about null and array bounds inside inlined library code.
+target_compile_options(geoflow_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference>)
+target_compile_definitions(geoflow_options INTERFACE
+  $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS;EIGEN_INITIALIZE_MATRICES_BY_NAN>
+  $<$<NOT:$<CONFIG:Debug>>:_FORTIFY_SOURCE=2>)
+if(GEOFLOW_SANITIZE)
+  target_compile_options(geoflow_options INTERFACE -fsanitize=${GEOFLOW_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(geoflow_options INTERFACE -fsanitize=${GEOFLOW_SANITIZE})
+  target_compile_definitions(geoflow_options INTERFACE _GLIBCXX_ASSERTIONS)
+endif()
+
+# geoflow_part(NAME SOURCES … [DEPENDS …] [PRIVATE_DEPENDS …])
+# A part is a static library geoflow_NAME with public headers in include/geoflow/NAME, checked to be self-contained.
+function(geoflow_part name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp"
+       "${CMAKE_CURRENT_SOURCE_DIR}/include/*.h")
+  add_library(geoflow_${name} STATIC ${ARG_SOURCES})
+  target_sources(geoflow_${name} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${headers})
+  target_include_directories(geoflow_${name} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  target_link_libraries(geoflow_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS} geoflow_options)
+  add_library(geoflow::${name} ALIAS geoflow_${name})
+endfunction()
+
+# geoflow_test(NAME SOURCES … DEPENDS … [LABELS …] [PRIVATE_OF part …])
+# A GoogleTest program; PRIVATE_OF gives it the private headers of those parts.
+function(geoflow_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LABELS;PRIVATE_OF" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} geoflow_test_support GTest::gmock GTest::gtest_main
+                                        geoflow_options)
+  foreach(part IN LISTS ARG_PRIVATE_OF)
+    target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/${part}")
+  endforeach()
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/tests")
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS fast)
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 600)
+endfunction()

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/time.hpp"
+
+/// What is known of the sensors' geometry and noise. Kalibr's names and conventions.
+namespace geoflow {
+
+enum class DistortionModel : std::uint8_t {
+  kNone,
+  kRadtan,       ///< k1 k2 p1 p2 (k3): Brown-Conrady as in OpenCV and Kalibr
+  kEquidistant,  ///< k1 k2 k3 k4: Kannala-Brandt fisheye
+};
+
+/// A pinhole camera. Pixel centres have integer coordinates, (0, 0) is the centre of the first pixel.
+struct CameraIntrinsics {
+  int width = 0;   ///< [px]
+  int height = 0;  ///< [px]
+  double fx = 0;   ///< [px]
+  double fy = 0;   ///< [px]
+  double cx = 0;   ///< [px]
+  double cy = 0;   ///< [px]
+  DistortionModel model = DistortionModel::kNone;
+  std::array<double, 5> distortion{};  ///< in the order of `model`; unused ones are 0
+};
+
+/// Continuous-time noise, as in Kalibr's imu.yaml. Defaults: the D435i's BMI055 as published for GeoFlow-SLAM's robot.
+struct ImuNoise {
+  double accel_noise_density = 1.176e-2;  ///< [m/s^2/sqrt(Hz)]
+  double accel_random_walk = 1e-3;        ///< [m/s^3/sqrt(Hz)]
+  double gyro_noise_density = 2.443e-3;   ///< [rad/s/sqrt(Hz)]
+  double gyro_random_walk = 1e-4;         ///< [rad/s^2/sqrt(Hz)]
+  double rate_hz = 200;
+};
+
+/// One robot's sensors. Depth is registered to the colour camera and shares its intrinsics.
+struct Calibration {
+  CameraIntrinsics camera;
+  double depth_unit_m = 1e-3;  ///< metres per count of a kDepth16 pixel
+  std::optional<SE3> T_cam_imu{};
+  /// t_imu = t_cam + this (Kalibr's timeshift_cam_imu).
+  Duration timeshift_cam_imu{};
+  ImuNoise imu_noise{};
+  /// Pose of the camera on the robot; none: the base frame is the camera frame.
+  std::optional<SE3> T_base_cam{};
+  std::string source;  ///< where it was read, for people
+  std::string serial;  ///< the camera's serial number; empty where the source does not say
+};
+
+}  // namespace geoflow
