@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
@@ -38,9 +39,9 @@ struct RawLayout {
 struct EncodedImage {
   ImageStream stream = ImageStream::kColor;
   ImageEncoding encoding = ImageEncoding::kCompressed;
-  RawLayout raw{};               ///< only of a kRaw image
-  std::vector<std::byte> bytes;  ///< not yet checked against anything
-  std::string origin;            ///< where it stands, for errors: `rgb.txt:12: rgb/0001.png`
+  RawLayout raw{};                 ///< only of a kRaw image
+  std::vector<std::byte> bytes{};  ///< not yet checked against anything
+  std::string origin{};            ///< where it stands, for errors: `rgb.txt:12: rgb/0001.png`
 };
 
 /// One sample in order of arrival. Its t_arrival is on the recording's time line.
@@ -76,6 +77,9 @@ class RecordingReader {
   [[nodiscard]] virtual const RecordingInfo& info() const = 0;
   [[nodiscard]] virtual FoundCalibration calibration() const { return {}; }
   [[nodiscard]] virtual RecordingStamps stamps() const { return {}; }
+
+  /// The faults of the events returned so far; null where no fault script is at work.
+  [[nodiscard]] virtual const FaultCounters* faults() const { return nullptr; }
 
   /// The next event; none at the end. An Error concerns one sample, names file and line or message
   /// number, and the next call goes on behind it; a reader that cannot go on returns its Error once

@@ -1,0 +1,51 @@
+#include "replay/factory.hpp"
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+#include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/result.hpp"
+
+#include "replay/reader.hpp"
+#include "replay/tum/reader.hpp"
+
+namespace geoflow::drivers {
+namespace {
+
+using Path = std::filesystem::path;
+
+/// How a format is recognised and opened. The first that fits is taken.
+struct Format {
+  const char* description;  ///< what it looks for
+  bool (*looks_like)(const Path&);
+  Result<std::unique_ptr<RecordingReader>> (*open)(const RecordingOptions&);
+};
+
+constexpr std::array kFormats = {
+    Format{.description = "TUM RGB-D (rgb.txt and depth.txt, or associations.txt)",
+           .looks_like = tum::looks_like,
+           .open = [](const RecordingOptions& options) { return tum::open(options.path); }},
+};
+
+}  // namespace
+
+Result<std::unique_ptr<RecordingReader>> open_recording(const RecordingOptions& options) {
+  std::error_code error;
+  if (!std::filesystem::exists(options.path, error)) {
+    return fail(ErrorCode::kNotFound, "{}: no such recording", options.path.string());
+  }
+  std::string looked_for;
+  for (const Format& format : kFormats) {
+    if (format.looks_like(options.path)) {
+      return format.open(options);
+    }
+    looked_for.append(looked_for.empty() ? "" : "; ").append(format.description);
+  }
+  return fail(ErrorCode::kUnsupported, "{}: not a recording of a known kind. Looked for: {}",
+              options.path.string(), looked_for);
+}
+
+}  // namespace geoflow::drivers
