@@ -1,0 +1,43 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+
+#include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/clock_fit.hpp"
+
+namespace geoflow::timesync {
+
+/// What the Synchroniser waits for, and how much it holds.
+struct SynchroniserConfig {
+  /// Largest distance of a colour and a depth frame that make a pair. The association lists of the
+  /// TUM RGB-D benchmark (eleven sequences, 18520 pairs) go up to 19.9 ms.
+  Duration depth_tolerance = std::chrono::milliseconds{20};
+  /// Whether a colour frame without a depth frame of its own may have one that another packet has
+  /// as well.
+  bool share_depth = true;
+  /// A packet goes out incomplete so long after its colour frame's arrival.
+  Duration max_wait = std::chrono::milliseconds{100};
+  /// A stream that was not heard for so long is not waited for until it is heard again.
+  Duration silent_after = std::chrono::milliseconds{500};
+  /// A stamp further ahead of its stream's newest is refused unless the next one agrees with it.
+  Duration max_step = std::chrono::seconds{5};
+  /// How many samples are held at most; then the oldest is given up and counted. Frames hold memory
+  /// of their pool.
+  std::size_t frame_capacity = 16;
+  std::size_t sample_capacity = 4096;  ///< of IMU, legs, body velocity: 8 s at 500 Hz
+  ClockFitConfig clock{};              ///< for streams of StampDomain::kDevice
+};
+
+/// Which streams there are, and how they are stamped.
+struct SynchroniserStreams {
+  StampInfo camera{};               ///< colour and depth: one clock
+  std::optional<StampInfo> imu{};   ///< none: there is no IMU, and it is not waited for
+  std::optional<StampInfo> legs{};  ///< legs and body velocity: one clock; waited for once heard
+  Duration
+      timeshift_cam_imu{};  ///< t_imu = t_cam + this; IMU samples leave on the camera's time line
+};
+
+}  // namespace geoflow::timesync

@@ -1,0 +1,23 @@
+#include "geoflow/timesync/liveness.hpp"
+
+#include <algorithm>
+#include <cstdint>
+
+#include "geoflow/hal/time.hpp"
+
+namespace geoflow::timesync {
+
+void Liveness::heard(HostTime t_arrival) noexcept {
+  last_ = last_ ? std::max(*last_, t_arrival) : t_arrival;
+  waiting_ = true;
+}
+
+bool Liveness::is_alive(HostTime now, HostTime began, std::uint64_t& silences) noexcept {
+  if (waiting_ && now - last_.value_or(began) > silent_after_) {
+    waiting_ = false;
+    ++silences;
+  }
+  return waiting_;
+}
+
+}  // namespace geoflow::timesync
