@@ -9,6 +9,7 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 
+#include "replay/bag/reader.hpp"
 #include "replay/reader.hpp"
 #include "replay/tum/reader.hpp"
 
@@ -25,6 +26,12 @@ struct Format {
 };
 
 constexpr std::array kFormats = {
+    Format{.description = "rosbag2 (metadata.yaml or .db3 files, sqlite3 storage)",
+           .looks_like = bag::looks_like,
+           .open =
+               [](const RecordingOptions& options) {
+                 return bag::open(options.path, options.topics);
+               }},
     Format{.description = "TUM RGB-D (rgb.txt and depth.txt, or associations.txt)",
            .looks_like = tum::looks_like,
            .open = [](const RecordingOptions& options) { return tum::open(options.path); }},

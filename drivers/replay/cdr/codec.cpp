@@ -8,7 +8,7 @@
 #include "geoflow/hal/result.hpp"
 
 #include "replay/cdr/cursor.hpp"
-#include "replay/cdr/messages.hpp"
+#include "replay/cdr/messages.hpp"  // IWYU pragma: keep (used by the instantiations)
 
 namespace geoflow::drivers::cdr {
 
@@ -19,8 +19,8 @@ Result<Message> decode(std::span<const std::byte> bytes) {
   Reader reader{bytes};
   Message message;
   reader.read(message);
-  if (reader.error()) {
-    return fail(ErrorCode::kInvalidData, "{}: {}", Message::kType, *reader.error());
+  if (const auto& error = reader.error()) {
+    return fail(ErrorCode::kInvalidData, "{}: {}", Message::kType, *error);
   }
   if (reader.remaining() > kMaxPaddingBytes) {
     return fail(ErrorCode::kInvalidData, "{}: {} bytes are left over at byte {}", Message::kType,

@@ -45,8 +45,8 @@ class Reader {
   void read(T& value) {
     std::apply([this](auto&... member) { (read(member), ...); }, T::fields(value));
   }
-  template <typename T, std::size_t kSize>
-  void read(std::array<T, kSize>& values) {
+  template <typename T, std::size_t Size>
+  void read(std::array<T, Size>& values) {
     for (T& value : values) {
       read(value);
     }
@@ -73,8 +73,7 @@ class Reader {
 
   template <Scalar T>
   void load(const std::byte* source, T& value) const {
-    std::array<std::byte, sizeof(T)>
-        bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled by the next line
+    std::array<std::byte, sizeof(T)> bytes{};
     for (std::size_t i = 0; i < sizeof(T); ++i) {
       bytes[i] = source[swap_ ? sizeof(T) - 1 - i : i];
     }
@@ -111,8 +110,8 @@ class Writer {
   void write(const T& value) {
     std::apply([this](const auto&... member) { (write(member), ...); }, T::fields(value));
   }
-  template <typename T, std::size_t kSize>
-  void write(const std::array<T, kSize>& values) {
+  template <typename T, std::size_t Size>
+  void write(const std::array<T, Size>& values) {
     for (const T& value : values) {
       write(value);
     }

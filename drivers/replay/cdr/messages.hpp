@@ -21,6 +21,10 @@ namespace geoflow::drivers::ros {
 /// to be written.
 using Bytes = std::span<const std::byte>;
 
+using Matrix3 = std::array<double, 3 * 3>;      ///< row by row
+using Matrix34 = std::array<double, 3 * 4>;     ///< row by row
+using Covariance6 = std::array<double, 6 * 6>;  ///< row by row; (x, y, z, rotation about x, y, z)
+
 /// builtin_interfaces/Time.
 struct Time {
   std::int32_t sec = 0;
@@ -75,9 +79,9 @@ struct CameraInfo {
   std::uint32_t width = 0;
   std::string distortion_model;
   std::vector<double> d;
-  std::array<double, 9> k{};   ///< 3 x 3, row by row
-  std::array<double, 9> r{};   ///< 3 x 3, row by row
-  std::array<double, 12> p{};  ///< 3 x 4, row by row
+  Matrix3 k{};
+  Matrix3 r{};
+  Matrix34 p{};
   std::uint32_t binning_x = 0;
   std::uint32_t binning_y = 0;
   RegionOfInterest roi;
@@ -107,12 +111,11 @@ struct Imu {
   static constexpr std::string_view kType = "sensor_msgs/msg/Imu";
   Header header;
   Quaternion orientation;
-  std::array<double, 9>
-      orientation_covariance{};  ///< first element -1: no orientation in this message
-  Vector3 angular_velocity;      ///< [rad/s]
-  std::array<double, 9> angular_velocity_covariance{};
+  Matrix3 orientation_covariance{};  ///< first element -1: no orientation in this message
+  Vector3 angular_velocity;          ///< [rad/s]
+  Matrix3 angular_velocity_covariance{};
   Vector3 linear_acceleration;  ///< [m/s^2]
-  std::array<double, 9> linear_acceleration_covariance{};
+  Matrix3 linear_acceleration_covariance{};
   static auto fields(auto& m) {
     return std::tie(m.header, m.orientation, m.orientation_covariance, m.angular_velocity,
                     m.angular_velocity_covariance, m.linear_acceleration,
@@ -140,8 +143,7 @@ struct Pose {
 
 struct PoseWithCovariance {
   Pose pose;
-  std::array<double, 36>
-      covariance{};  ///< 6 x 6 row by row, (x, y, z, rotation about x, y, z) in the parent's axes
+  Covariance6 covariance{};
   static auto fields(auto& m) { return std::tie(m.pose, m.covariance); }
 };
 
@@ -153,7 +155,7 @@ struct Twist {
 
 struct TwistWithCovariance {
   Twist twist;
-  std::array<double, 36> covariance{};
+  Covariance6 covariance{};
   static auto fields(auto& m) { return std::tie(m.twist, m.covariance); }
 };
 
