@@ -1,0 +1,75 @@
+"""Who may know whom: the table of docs/architecture.md in the form that layers.py reads."""
+from dataclasses import dataclass
+
+# part: the parts that it may include and link
+PARTS = {
+    "hal": {"hal"},
+    "timesync": {"timesync", "hal"},
+    "drivers": {"drivers", "hal"},
+    "slam": {"slam", "hal"},
+    "daemon": {"daemon", "slam", "drivers", "timesync", "hal"},
+    "tools": {"tools", "daemon", "slam", "drivers", "timesync", "hal"},
+    "tests": {"tests", "tools", "daemon", "slam", "drivers", "timesync", "hal"},
+}
+
+# Parts to which time is an argument.
+CLOCKLESS = {"slam", "timesync"}
+
+
+@dataclass(frozen=True)
+class Library:
+    """A third-party library: its headers (regex), its CMake targets, and the folders or files that may use it."""
+
+    name: str
+    headers: str
+    targets: tuple
+    rooms: tuple
+
+
+EVERYWHERE = ("hal", "timesync", "drivers", "slam", "daemon", "tools")
+
+LIBRARIES = (
+    Library("Eigen", r"(unsupported/)?Eigen/", ("Eigen3::Eigen",), EVERYWHERE),
+    Library("expected", r"tl/", ("tl::expected",), EVERYWHERE),
+    Library("fmt", r"fmt/", ("fmt::fmt",), EVERYWHERE),
+    Library("OpenCV", r"opencv2/", ("opencv_core", "opencv_imgproc", "opencv_imgcodecs", "opencv_video", "opencv_calib3d",
+                                    "opencv_features2d"), ("drivers/replay", "slam/vision", "tools/plot")),
+    Library("Ceres", r"ceres/", ("Ceres::ceres",), ("slam/optimisation", "tools/calibrate")),
+    Library("TBB", r"(oneapi/)?tbb/", ("TBB::tbb",), ("slam",)),
+    Library("nanoflann", r"nanoflann\.hpp", ("nanoflann::nanoflann",), ("slam/cloud", "slam/map")),
+    Library("Boost", r"boost/", ("Boost::headers",), ("timesync",)),
+    Library("SQLite", r"sqlite3\.h", ("PkgConfig::SQLITE3", "SQLite::SQLite3"), ("drivers/replay",)),
+    Library("zstd", r"zstd\.h", ("PkgConfig::ZSTD",), ("drivers/replay",)),
+    Library("yaml-cpp", r"yaml-cpp/", ("yaml-cpp",), ("drivers/replay",)),
+    Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay")),
+    Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/main.cpp", "tools")),
+    Library("nlohmann-json", r"nlohmann/", ("nlohmann_json::nlohmann_json",), ("daemon", "tools")),
+    Library("systemd", r"systemd/", ("PkgConfig::SYSTEMD",), ("daemon",)),
+    Library("udev", r"libudev\.h", ("PkgConfig::UDEV",), ("drivers/usb",)),
+    Library("libusb", r"libusb", ("PkgConfig::LIBUSB",), ("drivers/usb",)),
+    Library("V4L2", r"linux/(videodev2|uvcvideo|media)\.h", (), ("drivers/v4l2",)),
+    Library("SocketCAN", r"linux/can", (), ("drivers/can",)),
+    Library("OpenNI2", r"(openni2/)?OpenNI\.h", ("PkgConfig::OPENNI2",), ("drivers/openni2",)),
+    Library("DDS", r"dds/", ("CycloneDDS::ddsc", "CycloneDDS-CXX::ddscxx"), ("drivers/dds",)),
+    # Only for tests, as tools or as what to compare with.
+    Library("GoogleTest", r"(gtest|gmock)/",
+            ("GTest::gtest", "GTest::gmock", "GTest::gtest_main", "GTest::gmock_main"), ()),
+    Library("RapidCheck", r"rapidcheck", ("rapidcheck", "rapidcheck_gtest"), ()),
+    Library("Google Benchmark", r"benchmark/", ("benchmark::benchmark", "benchmark::benchmark_main"), ()),
+    Library("PCL", r"pcl/", ("${PCL_LIBRARIES}", "pcl_common", "pcl_registration", "pcl_filters"), ()),
+    Library("Fast-CDR", r"fastcdr/", ("fastcdr",), ()),
+    Library("threads", r"\0", ("Threads::Threads",), EVERYWHERE),
+)
+
+# The standard library, POSIX and the kernel's general interfaces.
+STANDARD = (r"^([a-z_]+|(sys|arpa|netinet|linux|net)/[a-z_]+\.h|[a-z_]*(unistd|fcntl|signal|poll|dirent|pthread|sched|"
+            r"stdlib|string|stdio|stdint|stddef|stdbool|errno|endian|inttypes|time|math|getopt|termios|dlfcn|cxxabi|spawn|"
+            r"grp|pwd|sysexits|locale|malloc|float|limits|assert|ctype)\.h)$")
+
+THREAD_HEADERS = {"thread", "mutex", "condition_variable", "shared_mutex", "semaphore", "barrier", "latch", "future",
+                  "pthread.h"}
+
+# The only files outside tests that make a thread or take a lock, each for the reason given.
+THREAD_FILES = (
+    "hal/src/log.cpp",  # the sink is called under a lock
+)
