@@ -1,0 +1,224 @@
+#include "geoflow/slam/core.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
+#include "map/map.hpp"
+#include "map/map_builder.hpp"
+#include "map/mapping_problem.hpp"
+#include "odometry/motion_model.hpp"
+#include "odometry/tracker.hpp"
+
+namespace geoflow::slam {
+
+class Core::Impl {
+ public:
+  Impl(const Calibration& calibration, const Config& config, std::shared_ptr<const CellGrid> grid,
+       StageObserver* observer)
+      : config_{config},
+        calibration_{calibration},
+        T_base_cam_{calibration.T_base_cam.value_or(SE3{})},
+        tracker_{config, gicp_, calibration, std::move(grid), observer},
+        builder_{config, gicp_, calibration, observer},
+        observer_{observer} {}
+
+  PoseEstimate process(const SyncedPacket& packet) {
+    const ImageShape& shape = packet.color.shape();
+    if (shape.width != calibration_.camera.width || shape.height != calibration_.camera.height) {
+      return predicted_only(packet);
+    }
+    tracker_.begin_frame(packet);
+    if (map_.keyframes().empty()) {
+      return start(packet);
+    }
+    return follow(packet);
+  }
+
+  std::optional<MappingTask> take_mapping_task() {
+    if (!pending_) {
+      return std::nullopt;
+    }
+    return builder_.task(map_, *std::exchange(pending_, std::nullopt));
+  }
+
+  void apply(const MappingResult& result) {
+    const SE3 T_new_old = builder_.apply(map_, *result.solution);
+    tracker_.current().T_odom_cam = T_new_old * tracker_.current().T_odom_cam;
+    motion_.move(T_new_old);
+  }
+
+  Trajectory final_trajectory() const {
+    Trajectory trajectory;
+    const SE3 T_cam_base = T_base_cam_.inverse();
+    for (const FrameRecord& record : records_) {
+      trajectory.push_back({record.t, map_.keyframe(record.reference).T_odom_cam *
+                                          record.T_reference_cam * T_cam_base});
+    }
+    return trajectory;
+  }
+
+ private:
+  /// A frame's pose relative to a keyframe, so that it follows when the keyframe is moved by later
+  /// optimisation.
+  struct FrameRecord {
+    HostTime t;
+    KeyframeId reference;
+    SE3 T_reference_cam;
+  };
+
+  PoseEstimate start(const SyncedPacket& packet) {
+    Frame& frame = tracker_.current();
+    frame.T_odom_cam = T_base_cam_;  // odom is the base frame of the first packet
+    motion_.update(packet.t, frame.T_odom_cam, false);
+    insert_keyframe(Matrix6d::Zero());
+    records_.push_back({packet.t, reference_, SE3{}});
+    PoseEstimate estimate = estimate_at(packet, frame.T_odom_cam);
+    estimate.status = TrackingStatus::kTracking;
+    estimate.source = PoseSource::kNone;
+    last_ = estimate;
+    return estimate;
+  }
+
+  PoseEstimate follow(const SyncedPacket& packet) {
+    const TrackingResult result = tracker_.track(map_, motion_);
+    const SE3 T_odom_cam = tracker_.current().T_odom_cam;
+    const bool fixed = result.visual_fix || result.depth_fix;
+    motion_.update(packet.t, T_odom_cam, fixed);
+
+    PoseEstimate estimate = estimate_at(packet, T_odom_cam);
+    estimate.source = result.source;
+    estimate.visual_inliers = result.solution.visual_inliers;
+    estimate.depth_inliers = result.solution.depth_inliers;
+    const Matrix6d covariance = covariance_in_odom(T_odom_cam, result.solution.information);
+    const Matrix6d A = T_base_cam_.adjoint();
+    estimate.covariance = A * covariance * A.transpose();
+    estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
+    estimate.quality = quality(result);
+
+    if (fixed && needs_keyframe(packet, result, T_odom_cam)) {
+      insert_keyframe(covariance);
+    }
+    records_.push_back(
+        {packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam});
+    last_ = estimate;
+    return estimate;
+  }
+
+  /// What can be said of a packet that cannot be looked at.
+  PoseEstimate predicted_only(const SyncedPacket& packet) {
+    PoseEstimate estimate = last_;
+    estimate.t = packet.t;
+    estimate.sequence = packet.sequence;
+    estimate.source = PoseSource::kConstantVelocity;
+    estimate.quality = 0;
+    if (map_.keyframes().empty()) {
+      estimate.status = TrackingStatus::kInitialising;
+      return estimate;
+    }
+    estimate.T_odom_base = motion_.predict(packet.t).T_odom_cam * T_base_cam_.inverse();
+    estimate.status = TrackingStatus::kDegraded;
+    return estimate;
+  }
+
+  PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {
+    PoseEstimate estimate;
+    estimate.t = packet.t;
+    estimate.sequence = packet.sequence;
+    estimate.T_odom_base = T_odom_cam * T_base_cam_.inverse();
+    // The twist of the base in the base, by the adjoint; its translation turned into odom.
+    const Vector6d twist_base = T_base_cam_.adjoint() * motion_.velocity();
+    estimate.w_base = twist_base.head<3>();
+    estimate.v_odom_base = estimate.T_odom_base.rotation() * twist_base.tail<3>();
+    return estimate;
+  }
+
+  /// Covariance of T_odom_cam: that of the reference keyframe, carried to this frame, plus that of
+  /// the registration.
+  Matrix6d covariance_in_odom(const SE3& T_odom_cam, const Matrix6d& information) const {
+    const Keyframe& reference = map_.keyframe(reference_);
+    const Matrix6d A = (T_odom_cam.inverse() * reference.T_odom_cam).adjoint();
+    return A * reference.covariance * A.transpose() +
+           information.ldlt().solve(Matrix6d::Identity());
+  }
+
+  static std::uint8_t quality(const TrackingResult& result) {
+    constexpr double kPlentyOfPoints = 100;
+    constexpr double kFull = 100;
+    const double visual = std::min(1.0, result.solution.visual_inliers / kPlentyOfPoints);
+    const double depth = result.depth_fix ? result.overlap : 0;
+    return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
+  }
+
+  bool needs_keyframe(const SyncedPacket& packet, const TrackingResult& result,
+                      const SE3& T_odom_cam) const {
+    const Keyframe& reference = map_.keyframe(reference_);
+    const Vector6d moved = (reference.T_odom_cam.inverse() * T_odom_cam).log();
+    const double share = static_cast<double>(result.solution.visual_inliers) /
+                         static_cast<double>(reference.points.size() + 1);
+    return moved.tail<3>().norm() > config_.keyframes.translation_m ||
+           moved.head<3>().norm() > config_.keyframes.rotation_rad ||
+           share < config_.keyframes.overlap / 2 ||
+           (result.depth_fix && result.overlap < config_.keyframes.overlap) ||
+           packet.t - reference.t > config_.keyframes.maximum_interval;
+  }
+
+  void insert_keyframe(const Matrix6d& covariance) {
+    const StageScope scope{observer_, Stage::kKeyframe};
+    reference_ = builder_.insert(map_, tracker_.current(), covariance);
+    if (map_.keyframes().size() > 1) {
+      pending_ = reference_;
+    }
+  }
+
+  Config config_;
+  GicpConfig gicp_;
+  Calibration calibration_;
+  SE3 T_base_cam_;
+  Tracker tracker_;
+  MapBuilder builder_;
+  MotionModel motion_;
+  Map map_;
+  KeyframeId reference_{};
+  std::optional<KeyframeId> pending_;
+  std::vector<FrameRecord> records_;
+  PoseEstimate last_;
+  StageObserver* observer_;
+};
+
+Core::Core(std::unique_ptr<Impl> impl) : impl_{std::move(impl)} {}
+Core::~Core() = default;
+
+Result<std::unique_ptr<Core>> Core::create(const Calibration& calibration, const Config& config,
+                                           StageObserver* observer) {
+  return CellGrid::create(calibration.camera, DepthCloudConfig{}.cell_px)
+      .map([&](std::shared_ptr<const CellGrid> grid) {
+        return std::make_unique<Core>(
+            std::make_unique<Impl>(calibration, config, std::move(grid), observer));
+      });
+}
+
+PoseEstimate Core::process(const SyncedPacket& packet) {
+  return impl_->process(packet);
+}
+std::optional<MappingTask> Core::take_mapping_task() {
+  return impl_->take_mapping_task();
+}
+void Core::apply(const MappingResult& result) {
+  impl_->apply(result);
+}
+Trajectory Core::final_trajectory() const {
+  return impl_->final_trajectory();
+}
+
+}  // namespace geoflow::slam

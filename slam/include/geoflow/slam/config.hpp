@@ -1,0 +1,70 @@
+#pragma once
+
+#include <chrono>
+
+#include "geoflow/hal/time.hpp"
+
+/// What can be set of the estimator. Plain structs; every default is meant to be used.
+namespace geoflow::slam {
+
+/// The paper's components, each of which can be left out (its ablation rows).
+struct Switches {
+  bool optical_flow = true;  ///< dual-stream flow (IV-A); off: ORB features matched by projection
+  bool gicp =
+      true;  ///< depth registration in the pose's first guess and in its optimisation (IV-B, IV-C)
+};
+
+/// Grid-spread ORB features (III-1).
+struct FeatureConfig {
+  int cell_px = 40;                ///< side of a grid cell [px]
+  int features_per_cell = 2;       ///< strongest corners kept in each cell
+  int fast_threshold = 20;         ///< FAST-9 contrast [gray levels]
+  int fast_threshold_minimum = 7;  ///< tried in cells that stay empty
+  double mask_radius_px = 10;      ///< no new feature nearer than this to a tracked one [px]
+};
+
+/// Pyramidal Lucas-Kanade (IV-A).
+struct FlowConfig {
+  int window_px = 21;    ///< side of the window [px]
+  int prior_levels = 1;  ///< coarsest level of the 3D-to-2D stream, whose start is predicted
+  int levels = 3;        ///< coarsest level of the 2D-to-2D stream
+  double forward_backward_px = 0.7;       ///< a track must return to its start within this [px]
+  double fundamental_threshold_px = 1.5;  ///< distance to the epipolar line [px]
+};
+
+/// Pose of one frame against the map (IV-B, IV-C).
+struct PoseConfig {
+  double pixel_sigma = 1.0;         ///< least standard deviation of a tracked feature [px]
+  int minimum_visual_inliers = 15;  ///< fewer do not count as a visual fix
+  double pnp_threshold_px = 3.0;    ///< RANSAC inlier distance [px]
+  int gicp_targets = 3;             ///< keyframes that a frame's depth is registered to at once
+  int gicp_surfels = 1200;          ///< of a frame's depth, chosen for a well-conditioned pose
+  int iterations = 8;               ///< Gauss-Newton steps at most
+};
+
+struct KeyframeConfig {
+  double translation_m = 0.12;  ///< moved this far from the reference keyframe [m]
+  double rotation_rad = 0.14;   ///< or turned this far [rad]
+  double overlap = 0.7;         ///< or less than this share of its features or depth still in view
+  Duration maximum_interval = std::chrono::seconds{2};
+};
+
+/// Local bundle adjustment (IV-C, figure 4).
+struct MappingConfig {
+  int window = 10;          ///< keyframes that move
+  int fixed = 10;           ///< further keyframes that see the same points or surfaces, held
+  int gicp_neighbours = 4;  ///< keyframes that a new one's depth is registered to
+  int iterations = 8;
+  double depth_sigma_at_1m = 0.003;  ///< of a feature's depth, growing with z^2 [m]
+};
+
+struct Config {
+  Switches switches;
+  FeatureConfig features;
+  FlowConfig flow;
+  PoseConfig pose;
+  KeyframeConfig keyframes;
+  MappingConfig mapping;
+};
+
+}  // namespace geoflow::slam

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/trajectory.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/stage.hpp"
+
+namespace geoflow::slam {
+
+/// The estimator. It owns no thread, no clock and no device: packets in, estimates out, the same
+/// packets give the same estimates bit for bit on one machine. Thread-bound: all calls from one
+/// thread at a time.
+///
+/// The odom frame is the base frame of the first packet.
+///
+///     auto core = Core::create(calibration, config).value();
+///     for (packet : packets) {
+///       const PoseEstimate estimate = core->process(packet);
+///       if (auto task = core->take_mapping_task()) {
+///         core->apply(optimise(*task));  // in lock step; or on another thread, applied between
+///         two later packets
+///       }
+///     }
+class Core {
+  class Impl;
+
+ public:
+  /// Errors: kInvalidArgument for a calibration without image size or focal length, or a
+  /// configuration value out of range. `observer` may be null; it must outlive the Core.
+  [[nodiscard]] static Result<std::unique_ptr<Core>> create(const Calibration& calibration,
+                                                            const Config& config,
+                                                            StageObserver* observer = nullptr);
+  /// For create(): nobody else has an Impl.
+  explicit Core(std::unique_ptr<Impl> impl);
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+  ~Core();
+
+  /// Tracks one packet. Never fails: what could not be estimated is said by the estimate's status.
+  /// A packet whose image has another size than the calibration's is answered by the prediction
+  /// alone, with status kDegraded.
+  [[nodiscard]] PoseEstimate process(const SyncedPacket& packet);
+
+  /// A snapshot for one local bundle adjustment, once after each keyframe; nothing otherwise.
+  [[nodiscard]] std::optional<MappingTask> take_mapping_task();
+
+  /// Takes over the result of a task of this Core. Keyframes made since the task was taken keep
+  /// their pose relative to its newest keyframe.
+  void apply(const MappingResult& result);
+
+  /// T_odom_base of every frame that was tracked, after all optimisation so far, in order of time.
+  [[nodiscard]] Trajectory final_trajectory() const;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace geoflow::slam

@@ -1,0 +1,68 @@
+#include "map/map.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+namespace geoflow::slam {
+
+KeyframeId Map::add_keyframe(Keyframe keyframe) {
+  const KeyframeId id{next_keyframe_++};
+  keyframes_.emplace(id, std::move(keyframe));
+  return id;
+}
+
+PointId Map::add_point(MapPoint point) {
+  const PointId id{next_point_++};
+  points_.emplace(id, std::move(point));
+  return id;
+}
+
+void Map::observe(PointId id, const Observation& observation) {
+  points_.at(id).observations.push_back(observation);
+  keyframes_.at(observation.keyframe).points.push_back(id);
+}
+
+void Map::remove_point(PointId id) {
+  const auto point = points_.find(id);
+  if (point == points_.end()) {
+    return;
+  }
+  for (const Observation& observation : point->second.observations) {
+    std::erase(keyframes_.at(observation.keyframe).points, id);
+  }
+  points_.erase(point);
+}
+
+void Map::remove_observation(PointId id, KeyframeId keyframe) {
+  MapPoint* point = find_point(id);
+  if (point == nullptr) {
+    return;
+  }
+  std::erase_if(point->observations, [&](const Observation& o) { return o.keyframe == keyframe; });
+  std::erase(keyframes_.at(keyframe).points, id);
+  if (point->observations.empty()) {
+    points_.erase(id);
+  }
+}
+
+void Map::keep_newest_clouds(std::size_t count) {
+  std::size_t kept = 0;
+  for (auto it = keyframes_.rbegin(); it != keyframes_.rend(); ++it) {
+    if (it->second.cloud && ++kept > count) {
+      it->second.cloud.reset();
+    }
+  }
+}
+
+MapPoint* Map::find_point(PointId id) {
+  const auto point = points_.find(id);
+  return point == points_.end() ? nullptr : &point->second;
+}
+
+const MapPoint* Map::find_point(PointId id) const {
+  const auto point = points_.find(id);
+  return point == points_.end() ? nullptr : &point->second;
+}
+
+}  // namespace geoflow::slam

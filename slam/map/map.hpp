@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/time.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "vision/orb_features.hpp"
+
+/// What has been seen, and from where. Value types, thread-compatible; odom is the map's frame.
+namespace geoflow::slam {
+
+enum class KeyframeId : std::uint32_t {};
+enum class PointId : std::uint32_t {};
+
+/// One keyframe's view of one map point.
+struct Observation {
+  KeyframeId keyframe;
+  Vector2d pixel;      ///< ideal [px]
+  double depth_m = 0;  ///< measured z in the camera frame [m]; 0 where the camera gave none
+};
+
+/// A point of the scene with the first descriptor it was seen with.
+struct MapPoint {
+  Vector3d p_odom = Vector3d::Zero();
+  Descriptor descriptor{};
+  std::vector<Observation> observations;  ///< in order of keyframe
+  std::uint32_t expected = 0;             ///< frames whose pose says that it is in view
+  std::uint32_t found = 0;                ///< of those, frames in which it agreed with the pose
+};
+
+/// The relative pose of two keyframes from their depth: a GICP factor (paper, equation (5)).
+struct DepthEdge {
+  KeyframeId from;
+  KeyframeId to;
+  SE3 T_from_to;
+  Matrix6d information = Matrix6d::Zero();  ///< of a right perturbation of T_from_to
+};
+
+/// A frame that was kept.
+struct Keyframe {
+  HostTime t;
+  SE3 T_odom_cam;
+  Matrix6d covariance = Matrix6d::Zero();   ///< of T_odom_cam
+  std::shared_ptr<const DepthCloud> cloud;  ///< null where the frame had no depth or it was let go
+  std::vector<PointId> points;              ///< that it observes
+};
+
+/// Keyframes, points and depth edges. Iterates in order of id, so that the same input gives the
+/// same map.
+class Map {
+ public:
+  KeyframeId add_keyframe(Keyframe keyframe);
+  PointId add_point(MapPoint point);
+  /// Records that a keyframe sees a point (once per pair).
+  void observe(PointId point, const Observation& observation);
+  void add_edge(const DepthEdge& edge) { edges_.push_back(edge); }
+  /// Forgets a point and all its observations.
+  void remove_point(PointId id);
+  /// Forgets one observation; a point left with none goes too.
+  void remove_observation(PointId id, KeyframeId keyframe);
+  /// Lets go of the depth of all but the newest `count` keyframes: what bounds the memory.
+  void keep_newest_clouds(std::size_t count);
+
+  [[nodiscard]] const std::map<KeyframeId, Keyframe>& keyframes() const noexcept {
+    return keyframes_;
+  }
+  [[nodiscard]] const std::map<PointId, MapPoint>& points() const noexcept { return points_; }
+  [[nodiscard]] const std::vector<DepthEdge>& edges() const noexcept { return edges_; }
+  [[nodiscard]] Keyframe& keyframe(KeyframeId id) { return keyframes_.at(id); }
+  [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return keyframes_.at(id); }
+  /// Null where the point is no more.
+  [[nodiscard]] MapPoint* find_point(PointId id);
+  [[nodiscard]] const MapPoint* find_point(PointId id) const;
+
+ private:
+  std::map<KeyframeId, Keyframe> keyframes_;
+  std::map<PointId, MapPoint> points_;
+  std::vector<DepthEdge> edges_;
+  std::uint32_t next_keyframe_ = 0;
+  std::uint32_t next_point_ = 0;
+};
+
+}  // namespace geoflow::slam

@@ -1,0 +1,290 @@
+#include "map/map_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/mapping.hpp"
+
+#include "map/overlap.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+constexpr double kEdgeOverlap =
+    0.4;  ///< keyframes that share at least this much of their depth are registered
+constexpr double kConsistentDepth =
+    0.05;  ///< relative difference within which a point found again is the same
+constexpr std::size_t kCloudsKept = 300;  ///< keyframes whose depth stays in memory
+
+/// The point nearest to two rays; none where they are nearly parallel or meet behind a camera.
+std::optional<Vector3d> intersect(const Vector3d& origin_a, const Vector3d& ray_a,
+                                  const Vector3d& origin_b, const Vector3d& ray_b) {
+  constexpr double kLeastParallax = 0.02;  // [rad]
+  const double sine = ray_a.cross(ray_b).norm() / (ray_a.norm() * ray_b.norm());
+  if (sine < kLeastParallax) {
+    return std::nullopt;
+  }
+  Eigen::Matrix<double, 3, 2> A;
+  A << ray_a, -ray_b;
+  const Vector2d depth = (A.transpose() * A).ldlt().solve(A.transpose() * (origin_b - origin_a));
+  if (depth.minCoeff() <= 0) {
+    return std::nullopt;
+  }
+  return 0.5 * (origin_a + depth.x() * ray_a + origin_b + depth.y() * ray_b);
+}
+
+}  // namespace
+
+MapBuilder::MapBuilder(const Config& config, const GicpConfig& gicp, const Calibration& calibration,
+                       StageObserver* observer)
+    : config_{config},
+      gicp_{gicp},
+      camera_{calibration.camera},
+      depth_unit_m_{calibration.depth_unit_m},
+      orb_{config.features},
+      observer_{observer} {}
+
+KeyframeId MapBuilder::insert(Map& map, Frame& frame, const Matrix6d& covariance) {
+  cull(map, frame);
+  const KeyframeId id = map.add_keyframe({.t = frame.t,
+                                          .T_odom_cam = frame.T_odom_cam,
+                                          .covariance = covariance,
+                                          .cloud = frame.cloud,
+                                          .points = {}});
+  observe_features(map, id, frame);
+  add_features(map, id, frame);
+  map.keep_newest_clouds(kCloudsKept);
+  return id;
+}
+
+void MapBuilder::cull(Map& map, const Frame& frame) const {
+  constexpr std::uint32_t kEnoughChances = 8;
+  constexpr double kLeastFound = 0.5;
+  for (const Feature& feature : frame.features) {
+    const MapPoint* point = feature.point ? map.find_point(*feature.point) : nullptr;
+    if (point != nullptr && point->expected >= kEnoughChances &&
+        point->found < kLeastFound * point->expected) {
+      map.remove_point(*feature.point);
+    }
+  }
+}
+
+void MapBuilder::observe_features(Map& map, KeyframeId keyframe, Frame& frame) const {
+  for (Feature& feature : frame.features) {
+    if (feature.point && map.find_point(*feature.point) == nullptr) {
+      feature.point.reset();
+    }
+    if (feature.point) {
+      map.observe(*feature.point, {keyframe, feature.ideal, feature.depth_m});
+    } else {
+      triangulate(map, keyframe, feature);
+    }
+  }
+}
+
+void MapBuilder::triangulate(Map& map, KeyframeId keyframe, Feature& feature) const {
+  const SE3& T_odom_cam = map.keyframe(keyframe).T_odom_cam;
+  std::optional<Vector3d> p_odom;
+  if (feature.depth_m > 0) {
+    p_odom = T_odom_cam * camera_.unproject(feature.ideal, feature.depth_m);
+  } else if (feature.anchor) {
+    const SE3& T_odom_anchor = map.keyframe(feature.anchor->keyframe).T_odom_cam;
+    p_odom = intersect(T_odom_anchor.translation(),
+                       T_odom_anchor.rotation() * camera_.unproject(feature.anchor->pixel, 1),
+                       T_odom_cam.translation(),
+                       T_odom_cam.rotation() * camera_.unproject(feature.ideal, 1));
+  }
+  if (!p_odom) {
+    if (!feature.anchor) {
+      feature.anchor = Feature::Anchor{keyframe, feature.ideal};
+    }
+    return;
+  }
+  feature.point =
+      map.add_point({.p_odom = *p_odom, .descriptor = feature.descriptor, .observations = {}});
+  if (feature.anchor) {
+    map.observe(*feature.point, {feature.anchor->keyframe, feature.anchor->pixel, 0});
+  }
+  map.observe(*feature.point, {keyframe, feature.ideal, feature.depth_m});
+}
+
+void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
+  constexpr double kSearchRadiusPx = 8;
+  const StageScope scope{observer_, Stage::kFeatures};
+  std::vector<Vector2d> taken;
+  std::set<PointId> present;
+  for (const Feature& feature : frame.features) {
+    taken.push_back(feature.raw);
+    if (feature.point) {
+      present.insert(*feature.point);
+    }
+  }
+  std::vector<PointId> points;
+  std::vector<double> depths;
+  std::vector<ExpectedFeature> expected;
+  const SE3 T_cam_odom = frame.T_odom_cam.inverse();
+  if (frame.cloud) {
+    for (const auto& [id, share] :
+         overlapping_keyframes(map, *frame.cloud, frame.T_odom_cam, kEdgeOverlap)) {
+      for (const PointId candidate : map.keyframe(id).points) {
+        const MapPoint& point = *map.find_point(candidate);
+        const Vector3d p_cam = T_cam_odom * point.p_odom;
+        if (p_cam.z() <= 0 || !present.insert(candidate).second) {
+          continue;
+        }
+        const Vector2d raw = camera_.distort(camera_.project(p_cam));
+        if (camera_.contains(raw, 0)) {
+          points.push_back(candidate);
+          depths.push_back(p_cam.z());
+          expected.push_back({raw, point.descriptor});
+        }
+      }
+    }
+  }
+  const std::vector<OrbFeature> found = orb_.extract(frame.pyramid.image(), taken);
+  const std::vector<int> match = match_by_projection(expected, found, kSearchRadiusPx);
+  std::vector<std::size_t> expected_of_feature(found.size(), expected.size());
+  for (std::size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0) {
+      expected_of_feature[static_cast<std::size_t>(match[i])] = i;
+    }
+  }
+  for (std::size_t j = 0; j < found.size(); ++j) {
+    Feature feature{.raw = found[j].pixel,
+                    .ideal = camera_.undistort(found[j].pixel),
+                    .depth_m = depth_at(frame.depth, found[j].pixel, depth_unit_m_),
+                    .descriptor = found[j].descriptor};
+    const std::size_t i = expected_of_feature[j];
+    if (i < expected.size() &&
+        std::abs(feature.depth_m - depths[i]) < kConsistentDepth * depths[i]) {
+      feature.point = points[i];
+      map.observe(points[i], {keyframe, feature.ideal, feature.depth_m});
+    } else {
+      triangulate(map, keyframe, feature);
+    }
+    frame.features.push_back(feature);
+  }
+}
+
+MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
+  auto problem = std::make_shared<MappingProblem>();
+  problem->camera = camera_.intrinsics();
+  problem->pose = config_.pose;
+  problem->mapping = config_.mapping;
+  problem->gicp = gicp_;
+
+  const Keyframe& center = map.keyframe(newest);
+  std::vector<OverlappingKeyframe> overlapping;
+  if (config_.switches.gicp && center.cloud) {
+    overlapping = overlapping_keyframes(map, *center.cloud, center.T_odom_cam, kEdgeOverlap);
+    std::erase_if(overlapping, [&](const OverlappingKeyframe& k) { return k.id == newest; });
+  }
+  for (const KeyframeId id : registration_targets(
+           overlapping, static_cast<std::size_t>(config_.mapping.gicp_neighbours))) {
+    problem->edges_to_measure.emplace_back(id, newest);
+  }
+
+  // The window moves: the newest keyframes. Held: those most connected with it, by edges and by
+  // points.
+  std::set<KeyframeId> moving;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
+    if (moving.size() < static_cast<std::size_t>(config_.mapping.window)) {
+      moving.insert(it->first);
+    }
+  }
+  std::map<KeyframeId, std::size_t> connection;
+  constexpr std::size_t kEdgeCounts = 100;  // an edge ties as firmly as this many common points
+  const auto connect = [&](KeyframeId a, KeyframeId b, std::size_t strength) {
+    if (moving.contains(a) != moving.contains(b)) {
+      connection[moving.contains(a) ? b : a] += strength;
+    }
+  };
+  std::set<PointId> points;
+  for (const KeyframeId id : moving) {
+    points.insert(map.keyframe(id).points.begin(), map.keyframe(id).points.end());
+  }
+  for (const PointId id : points) {
+    for (const Observation& observation : map.find_point(id)->observations) {
+      if (!moving.contains(observation.keyframe)) {
+        ++connection[observation.keyframe];
+      }
+    }
+  }
+  for (const DepthEdge& edge : map.edges()) {
+    connect(edge.from, edge.to, kEdgeCounts);
+  }
+  for (const auto& [from, to] : problem->edges_to_measure) {
+    connect(from, to, kEdgeCounts);
+  }
+  std::vector<std::pair<std::size_t, KeyframeId>> by_connection;
+  for (const auto& [id, strength] : connection) {
+    by_connection.emplace_back(strength, id);
+  }
+  std::sort(by_connection.rbegin(), by_connection.rend());
+  by_connection.resize(
+      std::min(by_connection.size(), static_cast<std::size_t>(config_.mapping.fixed)));
+  std::set<KeyframeId> fixed;
+  for (const auto& [strength, id] : by_connection) {
+    fixed.insert(id);
+  }
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (moving.contains(id) || fixed.contains(id)) {
+      problem->keyframes.push_back({id, keyframe.T_odom_cam, fixed.contains(id), keyframe.cloud});
+    }
+  }
+  if (fixed.empty()) {
+    problem->keyframes.front().fixed = true;
+  }
+  const auto inside = [&](KeyframeId id) { return moving.contains(id) || fixed.contains(id); };
+  for (const PointId id : points) {
+    const MapPoint& point = *map.find_point(id);
+    MappingPoint snapshot{id, point.p_odom, {}};
+    std::copy_if(point.observations.begin(), point.observations.end(),
+                 std::back_inserter(snapshot.observations),
+                 [&](const Observation& o) { return inside(o.keyframe); });
+    if (snapshot.observations.size() > 1) {
+      problem->points.push_back(std::move(snapshot));
+    }
+  }
+  std::copy_if(map.edges().begin(), map.edges().end(), std::back_inserter(problem->edges),
+               [&](const DepthEdge& e) { return inside(e.from) && inside(e.to); });
+  std::erase_if(problem->edges_to_measure, [&](const auto& pair) { return !inside(pair.first); });
+  return {problem};
+}
+
+SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
+  SE3 T_new_old;
+  if (!solution.T_odom_cam.empty()) {
+    const auto& [newest, pose] = *solution.T_odom_cam.rbegin();
+    T_new_old = pose * map.keyframe(newest).T_odom_cam.inverse();
+    for (auto it = map.keyframes().upper_bound(newest); it != map.keyframes().end(); ++it) {
+      map.keyframe(it->first).T_odom_cam = T_new_old * it->second.T_odom_cam;
+    }
+  }
+  for (const auto& [id, pose] : solution.T_odom_cam) {
+    map.keyframe(id).T_odom_cam = pose;
+  }
+  for (const auto& [id, p_odom] : solution.p_odom) {
+    if (MapPoint* point = map.find_point(id)) {
+      point->p_odom = p_odom;
+    }
+  }
+  for (const auto& [point, keyframe] : solution.outliers) {
+    map.remove_observation(point, keyframe);
+  }
+  for (const DepthEdge& edge : solution.measured) {
+    map.add_edge(edge);
+  }
+  return T_new_old;
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
+#include "map/map.hpp"
+
+/// What goes into and comes out of one local bundle adjustment: plain snapshots, so that it can run
+/// in any thread.
+namespace geoflow::slam {
+
+struct MappingKeyframe {
+  KeyframeId id;
+  SE3 T_odom_cam;
+  bool fixed = false;
+  std::shared_ptr<const DepthCloud> cloud;  ///< null: none
+};
+
+struct MappingPoint {
+  PointId id;
+  Vector3d p_odom;
+  std::vector<Observation> observations;  ///< only by keyframes of the problem
+};
+
+struct MappingProblem {
+  std::vector<MappingKeyframe> keyframes;  ///< in order of id; at least one is fixed
+  std::vector<MappingPoint> points;
+  std::vector<DepthEdge> edges;  ///< known ones between keyframes of the problem
+  std::vector<std::pair<KeyframeId, KeyframeId>>
+      edges_to_measure;  ///< pairs whose depth is to be registered first
+  CameraIntrinsics camera;
+  PoseConfig pose;
+  MappingConfig mapping;
+  GicpConfig gicp;
+};
+
+struct MappingSolution {
+  std::map<KeyframeId, SE3> T_odom_cam;                  ///< of the keyframes that moved
+  std::map<PointId, Vector3d> p_odom;                    ///< of the points that moved
+  std::vector<std::pair<PointId, KeyframeId>> outliers;  ///< observations that contradict the rest
+  std::vector<DepthEdge> measured;                       ///< registrations that succeeded
+};
+
+}  // namespace geoflow::slam

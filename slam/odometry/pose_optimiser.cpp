@@ -1,0 +1,152 @@
+#include "odometry/pose_optimiser.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/gicp.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+constexpr double kMinimumDepthM = 0.05;  ///< nearer points project wildly
+constexpr double kCauchyWidth = 2.0;     ///< in standard deviations
+
+/// Weight of a residual of `chi2` squared standard deviations under the Cauchy kernel.
+double cauchy_weight(double chi2) {
+  return 1 / (1 + chi2 / (kCauchyWidth * kCauchyWidth));
+}
+
+/// d(T^-1 p)/d(xi) for T * exp(xi), rotation first: with q = T^-1 p, [ skew(q), -I ].
+Eigen::Matrix<double, 3, 6> camera_point_jacobian(const Vector3d& q) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << skew(q), -Matrix3d::Identity();
+  return J;
+}
+
+}  // namespace
+
+struct PoseOptimiser::System {
+  Matrix6d visual = Matrix6d::Zero();
+  Matrix6d depth = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  std::uint32_t depth_inliers = 0;
+};
+
+double PoseOptimiser::pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const {
+  constexpr double kMedianOfRayleigh = 1.17741;  // median of |r| of a 2-D Gaussian with sigma 1
+  std::vector<double> residuals;
+  const SE3 T_cam_odom = T_odom_cam.inverse();
+  for (const VisualMatch& match : problem.matches) {
+    const Vector3d p_cam = T_cam_odom * match.p_odom;
+    if (p_cam.z() > kMinimumDepthM) {
+      residuals.push_back((camera_.project(p_cam) - match.pixel).norm());
+    }
+  }
+  if (residuals.empty()) {
+    return config_.pixel_sigma;
+  }
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  return std::max(config_.pixel_sigma, *middle / kMedianOfRayleigh);
+}
+
+void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
+                               System& system) const {
+  const SE3 T_cam_odom = T_odom_cam.inverse();
+  for (const VisualMatch& match : problem.matches) {
+    const Vector3d p_cam = T_cam_odom * match.p_odom;
+    if (p_cam.z() < kMinimumDepthM) {
+      continue;
+    }
+    const Eigen::Matrix<double, 3, 6> J_point = camera_point_jacobian(p_cam);
+    const Vector2d r = (camera_.project(p_cam) - match.pixel) / sigma_px;
+    const Eigen::Matrix<double, 2, 6> J = camera_.project_jacobian(p_cam) * J_point / sigma_px;
+    const double weight = cauchy_weight(r.squaredNorm());
+    system.visual += weight * J.transpose() * J;
+    system.gradient += weight * J.transpose() * r;
+    if (match.depth_m > 0) {
+      const double sigma_m = mapping_.depth_sigma_at_1m * match.depth_m * match.depth_m;
+      const double rz = (p_cam.z() - match.depth_m) / sigma_m;
+      const Eigen::Matrix<double, 1, 6> Jz = J_point.row(2) / sigma_m;
+      const double weight_z = weight * cauchy_weight(rz * rz);
+      system.visual += weight_z * Jz.transpose() * Jz;
+      system.gradient += weight_z * Jz.transpose() * rz;
+    }
+  }
+}
+
+void PoseOptimiser::add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
+                              const SE3& T_odom_cam, System& system) const {
+  for (const DepthTarget& target : problem.targets) {
+    // A right perturbation of T_target_cam is one of T_odom_cam, so the systems simply add.
+    const SE3 T_target_cam = target.T_odom_target.inverse() * T_odom_cam;
+    const NormalEquations equations =
+        linearise(*problem.cloud, sample, *target.cloud, T_target_cam, gicp_);
+    const double share = 1.0 / static_cast<double>(problem.targets.size());
+    system.depth += share * equations.H;
+    system.gradient += share * equations.b;
+    system.depth_inliers =
+        std::max(system.depth_inliers, static_cast<std::uint32_t>(equations.inliers));
+  }
+}
+
+void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
+                             PoseSolution& solution) const {
+  constexpr double kChi2Of2At95Percent = 5.991;
+  const SE3 T_cam_odom = solution.T_odom_cam.inverse();
+  solution.inlier.assign(problem.matches.size(), false);
+  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
+    const Vector3d p_cam = T_cam_odom * problem.matches[i].p_odom;
+    if (p_cam.z() < kMinimumDepthM) {
+      continue;
+    }
+    const double chi2 =
+        (camera_.project(p_cam) - problem.matches[i].pixel).squaredNorm() / (sigma_px * sigma_px);
+    if (chi2 < kChi2Of2At95Percent) {
+      solution.inlier[i] = true;
+      ++solution.visual_inliers;
+    }
+  }
+}
+
+PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) const {
+  constexpr double kConverged = 1e-5;  // [rad], [m]
+  PoseSolution solution;
+  solution.T_odom_cam = start;
+  std::vector<SurfelSample> sample;
+  if (problem.cloud != nullptr && !problem.targets.empty()) {
+    sample = select(*problem.cloud, static_cast<std::size_t>(config_.gicp_surfels));
+    solution.depth_surfels = static_cast<std::uint32_t>(sample.size());
+  }
+  for (int i = 0; i < config_.iterations; ++i) {
+    System system;
+    solution.pixel_sigma = pixel_sigma(problem, solution.T_odom_cam);
+    add_visual(problem, solution.T_odom_cam, solution.pixel_sigma, system);
+    add_depth(problem, sample, solution.T_odom_cam, system);
+    const Vector6d from_prior = (problem.prior.T_odom_cam.inverse() * solution.T_odom_cam).log();
+    system.gradient += problem.prior.information * from_prior;
+    solution.information = system.visual + system.depth + problem.prior.information;
+    solution.visual_information = system.visual;
+    solution.depth_information = system.depth;
+    solution.depth_inliers = system.depth_inliers;
+    const Vector6d step = -solution.information.ldlt().solve(system.gradient);
+    if (!step.allFinite()) {
+      break;
+    }
+    solution.T_odom_cam = solution.T_odom_cam * SE3::exp(step);
+    if (step.norm() < kConverged) {
+      break;
+    }
+  }
+  classify(problem, solution.pixel_sigma, solution);
+  return solution;
+}
+
+}  // namespace geoflow::slam

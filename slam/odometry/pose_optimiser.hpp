@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
+#include "vision/camera_model.hpp"
+
+/// Single-frame optimisation (paper, section IV-C): the pose of one camera against the map, by all
+/// that says something about it at once.
+namespace geoflow::slam {
+
+/// A map point found in the frame.
+struct VisualMatch {
+  Vector3d p_odom;     ///< held fixed
+  Vector2d pixel;      ///< ideal [px]
+  double depth_m = 0;  ///< measured z [m]; 0: none
+};
+
+/// A keyframe's depth, in place.
+struct DepthTarget {
+  const DepthCloud* cloud;
+  SE3 T_odom_target;
+};
+
+/// A Gaussian belief about the pose: mean and information of a right perturbation.
+struct PosePrior {
+  SE3 T_odom_cam;
+  Matrix6d information = Matrix6d::Zero();
+};
+
+struct PoseProblem {
+  std::span<const VisualMatch> matches;
+  const DepthCloud* cloud = nullptr;  ///< the frame's own depth; null: none
+  std::span<const DepthTarget> targets;
+  PosePrior prior;  ///< the motion model's prediction: decides only what nothing else sees
+};
+
+struct PoseSolution {
+  SE3 T_odom_cam;
+  Matrix6d information = Matrix6d::Zero();  ///< of all terms at the solution, right perturbation
+  std::vector<bool> inlier;                 ///< of each visual match
+  std::uint32_t visual_inliers = 0;
+  std::uint32_t depth_inliers =
+      0;  ///< of depth_surfels, the largest number that pairs with one target
+  std::uint32_t depth_surfels = 0;  ///< of the frame that were tried
+  double pixel_sigma = 0;  ///< standard deviation of the visual residuals, estimated from them [px]
+  Matrix6d visual_information = Matrix6d::Zero();
+  Matrix6d depth_information = Matrix6d::Zero();
+};
+
+/// Robust Gauss-Newton from `start`. Residuals:
+///   reprojection  r_v = pi(T^-1 p) - u              (equation (3)), Cauchy kernel
+///   depth         r_z = [T^-1 p]_z - z              Cauchy kernel, sigma growing with z^2
+///   GICP          distribution to distribution against every target at once (equation (5))
+///   prior         log(T_prior^-1 T)
+/// The visual standard deviation is estimated from the residuals themselves in every step (median),
+/// never below PoseConfig::pixel_sigma: a camera whose colour does not fit its depth thereby yields
+/// to the depth, without a switch.
+class PoseOptimiser {
+ public:
+  PoseOptimiser(const PoseConfig& config, const MappingConfig& mapping, const GicpConfig& gicp,
+                const CameraModel& camera)
+      : config_{config}, mapping_{mapping}, gicp_{gicp}, camera_{camera} {}
+
+  [[nodiscard]] PoseSolution solve(const PoseProblem& problem, const SE3& start) const;
+
+ private:
+  struct System;
+  [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
+  void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
+                  System& system) const;
+  void add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
+                 const SE3& T_odom_cam, System& system) const;
+  void classify(const PoseProblem& problem, double sigma_px, PoseSolution& solution) const;
+
+  PoseConfig config_;
+  MappingConfig mapping_;
+  GicpConfig gicp_;
+  CameraModel camera_;
+};
+
+}  // namespace geoflow::slam

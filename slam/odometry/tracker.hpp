@@ -1,0 +1,73 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/slam/stage.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "map/map.hpp"
+#include "odometry/frame.hpp"
+#include "odometry/motion_model.hpp"
+#include "odometry/pose_optimiser.hpp"
+#include "vision/dual_stream_flow.hpp"
+#include "vision/orb_features.hpp"
+
+namespace geoflow::slam {
+
+/// A frame against the map.
+struct TrackingResult {
+  PoseSolution solution;
+  PoseSource source = PoseSource::kNone;
+  bool visual_fix = false;  ///< enough map points agree with the pose
+  bool depth_fix = false;   ///< enough of the depth agrees, in all six directions
+  double overlap = 0;  ///< largest share of the frame's depth that one keyframe sees too, 0 to 1
+};
+
+/// Follows the camera from frame to frame against a map that others build: predict, track,
+/// initialise, optimise, in the paper's order (sections IV-A to IV-C). Thread-bound.
+class Tracker {
+ public:
+  Tracker(const Config& config, const GicpConfig& gicp, const Calibration& calibration,
+          std::shared_ptr<const CellGrid> grid, StageObserver* observer);
+
+  /// Reads a packet's images into the current frame, and the one before into previous().
+  void begin_frame(const SyncedPacket& packet);
+
+  /// Pose of the current frame. Features that contradict it are dropped from the frame.
+  [[nodiscard]] TrackingResult track(Map& map, const MotionModel& motion);
+
+  [[nodiscard]] Frame& current() noexcept { return current_; }
+  [[nodiscard]] const Frame& current() const noexcept { return current_; }
+
+ private:
+  void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
+  void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
+  void find_again(const Map& map, const std::vector<KeyframeId>& keyframes);
+  [[nodiscard]] std::vector<VisualMatch> matches(const Map& map,
+                                                 std::vector<std::size_t>& feature_of_match) const;
+  [[nodiscard]] SE3 initial_pose(const Map& map, const SE3& predicted,
+                                 std::span<const VisualMatch> matches, PoseSource& source);
+  void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
+                    const PoseSolution& solution);
+  [[nodiscard]] Feature feature_at(const Vector2d& raw) const;
+
+  Config config_;
+  GicpConfig gicp_;
+  Calibration calibration_;
+  CameraModel camera_;
+  DualStreamFlow flow_;
+  PoseOptimiser optimiser_;
+  OrbExtractor orb_;
+  std::shared_ptr<const CellGrid> grid_;
+  StageObserver* observer_;
+  Frame previous_;
+  Frame current_;
+};
+
+}  // namespace geoflow::slam

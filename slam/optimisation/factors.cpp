@@ -1,0 +1,136 @@
+#include "optimisation/factors.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include "geoflow/hal/geometry.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+template <int Rows>
+using PoseJacobian = Eigen::Map<Eigen::Matrix<double, Rows, kPoseSize, Eigen::RowMajor>>;
+
+/// The camera-frame point and its derivatives by pose and point.
+struct CameraPoint {
+  Vector3d p_cam;
+  Matrix3d R_cam_odom;
+
+  CameraPoint(const double* pose, const double* point) {
+    const SE3 T_odom_cam = from_block(pose);
+    R_cam_odom = T_odom_cam.rotation_matrix().transpose();
+    p_cam = R_cam_odom * (Eigen::Map<const Vector3d>{point} - T_odom_cam.translation());
+  }
+  /// J is d(residual)/d(p_cam).
+  template <int Rows>
+  void chain(const Eigen::Matrix<double, Rows, 3>& J, double** jacobians) const {
+    if (jacobians == nullptr) {
+      return;
+    }
+    if (jacobians[0] != nullptr) {
+      PoseJacobian<Rows> by_pose{jacobians[0]};
+      by_pose.template leftCols<3>() = J * skew(p_cam);
+      by_pose.template middleCols<3>(3) = -J;
+      by_pose.col(kPoseTangentSize).setZero();
+    }
+    if (jacobians[1] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, Rows, 3, Eigen::RowMajor>>{jacobians[1]} = J * R_cam_odom;
+    }
+  }
+};
+
+/// Nearer than this a point has no usable projection: the step that led there is refused.
+constexpr double kMinimumDepthM = 1e-3;
+
+}  // namespace
+
+PoseBlock to_block(const SE3& T) noexcept {
+  const Eigen::Quaterniond& q = T.rotation();
+  const Vector3d& p = T.translation();
+  return {q.x(), q.y(), q.z(), q.w(), p.x(), p.y(), p.z()};
+}
+
+SE3 from_block(const double* block) noexcept {
+  return SE3{Eigen::Quaterniond{Eigen::Map<const Eigen::Vector4d>{block}},
+             Eigen::Map<const Vector3d>{block + 4}};
+}
+
+bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
+  const PoseBlock block = to_block(from_block(x) * SE3::exp(Eigen::Map<const Vector6d>{delta}));
+  std::copy(block.begin(), block.end(), x_plus_delta);
+  return true;
+}
+
+bool PoseManifold::PlusJacobian(const double* /*x*/, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, kPoseSize, kPoseTangentSize, Eigen::RowMajor>>{jacobian}
+      .setIdentity();
+  return true;
+}
+
+bool PoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
+  Eigen::Map<Vector6d>{y_minus_x} = (from_block(x).inverse() * from_block(y)).log();
+  return true;
+}
+
+bool PoseManifold::MinusJacobian(const double* /*x*/, double* jacobian) const {
+  Eigen::Map<Eigen::Matrix<double, kPoseTangentSize, kPoseSize, Eigen::RowMajor>>{jacobian}
+      .setIdentity();
+  return true;
+}
+
+bool ReprojectionFactor::Evaluate(const double* const* parameters, double* residuals,
+                                  double** jacobians) const {
+  const CameraPoint point{parameters[0], parameters[1]};
+  if (point.p_cam.z() < kMinimumDepthM) {
+    return false;
+  }
+  Eigen::Map<Vector2d>{residuals} = (camera_.project(point.p_cam) - pixel_) / sigma_px_;
+  point.chain<2>(camera_.project_jacobian(point.p_cam) / sigma_px_, jacobians);
+  return true;
+}
+
+bool PointDepthFactor::Evaluate(const double* const* parameters, double* residuals,
+                                double** jacobians) const {
+  const CameraPoint point{parameters[0], parameters[1]};
+  residuals[0] = (point.p_cam.z() - depth_m_) / sigma_m_;
+  point.chain<1>(Eigen::RowVector3d::UnitZ() / sigma_m_, jacobians);
+  return true;
+}
+
+RelativePoseFactor::RelativePoseFactor(const SE3& T_a_b, const Matrix6d& information)
+    : T_b_a_{T_a_b.inverse()} {
+  // A symmetric root stays real and finite where a direction is open (eigenvalue zero, or a
+  // rounding below it).
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen{information};
+  W_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
+       eigen.eigenvectors().transpose();
+}
+
+bool RelativePoseFactor::Evaluate(const double* const* parameters, double* residuals,
+                                  double** jacobians) const {
+  const SE3 T_odom_a = from_block(parameters[0]);
+  const SE3 T_odom_b = from_block(parameters[1]);
+  const SE3 T_a_b = T_odom_a.inverse() * T_odom_b;
+  const Vector6d error = (T_b_a_ * T_a_b).log();
+  Eigen::Map<Vector6d>{residuals} = W_ * error;
+  if (jacobians == nullptr) {
+    return true;
+  }
+  const Matrix6d J = W_ * SE3::right_jacobian_inverse(error);
+  if (jacobians[0] != nullptr) {
+    PoseJacobian<kPoseTangentSize> by_a{jacobians[0]};
+    by_a.leftCols<kPoseTangentSize>() = -J * T_a_b.inverse().adjoint();
+    by_a.col(kPoseTangentSize).setZero();
+  }
+  if (jacobians[1] != nullptr) {
+    PoseJacobian<kPoseTangentSize> by_b{jacobians[1]};
+    by_b.leftCols<kPoseTangentSize>() = J;
+    by_b.col(kPoseTangentSize).setZero();
+  }
+  return true;
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+
+#include <ceres/manifold.h>
+#include <ceres/sized_cost_function.h>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "vision/camera_model.hpp"
+
+/// Factors of bundle adjustment, one struct each, with analytic Jacobians.
+///
+/// A pose parameter is 7 doubles (qx qy qz qw, tx ty tz) of T_odom_cam, its tangent a right
+/// perturbation, rotation first. The factors give derivatives by that tangent in the first six
+/// columns and zero in the seventh: PoseManifold's PlusJacobian is [I; 0], so that Ceres's chain
+/// rule takes them as they are and no quaternion derivative is computed.
+namespace geoflow::slam {
+
+inline constexpr int kPoseSize = 7;
+inline constexpr int kPoseTangentSize = 6;
+using PoseBlock = std::array<double, kPoseSize>;
+
+[[nodiscard]] PoseBlock to_block(const SE3& T) noexcept;
+[[nodiscard]] SE3 from_block(const double* block) noexcept;
+
+/// See the head of this file.
+class PoseManifold final : public ceres::Manifold {
+ public:
+  [[nodiscard]] int AmbientSize() const override { return kPoseSize; }
+  [[nodiscard]] int TangentSize() const override { return kPoseTangentSize; }
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
+  bool PlusJacobian(const double* x, double* jacobian) const override;
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
+  bool MinusJacobian(const double* x, double* jacobian) const override;
+};
+
+/// Reprojection of a point (paper, equation (3)): (pi(T^-1 p) - u) / sigma; parameters: pose, point
+/// (odom) [m].
+class ReprojectionFactor final : public ceres::SizedCostFunction<2, kPoseSize, 3> {
+ public:
+  ReprojectionFactor(const CameraModel& camera, const Vector2d& pixel, double sigma_px)
+      : camera_{camera}, pixel_{pixel}, sigma_px_{sigma_px} {}
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  CameraModel camera_;
+  Vector2d pixel_;
+  double sigma_px_;
+};
+
+/// Measured depth of a point: ([T^-1 p]_z - z) / sigma; parameters: pose, point (odom) [m].
+class PointDepthFactor final : public ceres::SizedCostFunction<1, kPoseSize, 3> {
+ public:
+  PointDepthFactor(double depth_m, double sigma_m) : depth_m_{depth_m}, sigma_m_{sigma_m} {}
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  double depth_m_;
+  double sigma_m_;
+};
+
+/// Relative pose of two cameras (paper, equation (5)): W log(Z^-1 Ta^-1 Tb), with W^T W the
+/// information of a right perturbation of Z = T_a_b; parameters: pose a, pose b.
+class RelativePoseFactor final
+    : public ceres::SizedCostFunction<kPoseTangentSize, kPoseSize, kPoseSize> {
+ public:
+  RelativePoseFactor(const SE3& T_a_b, const Matrix6d& information);
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  SE3 T_b_a_;
+  Matrix6d W_;
+};
+
+}  // namespace geoflow::slam

@@ -1,0 +1,201 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/stage.hpp"
+
+#include "cloud/gicp.hpp"
+#include "map/map.hpp"
+#include "map/mapping_problem.hpp"
+#include "optimisation/factors.hpp"
+#include "vision/camera_model.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+constexpr double kCauchyWidth =
+    2.0;  ///< of reprojection and depth residuals, in standard deviations
+constexpr double kHuberWidth = 2.5;  ///< of depth edges, in standard deviations of six dimensions
+
+class LocalBundleAdjustment {
+ public:
+  explicit LocalBundleAdjustment(const MappingProblem& problem)
+      : problem_{problem}, camera_{problem.camera} {}
+
+  MappingSolution solve() {
+    solution_ = std::make_unique<MappingSolution>();
+    for (const MappingKeyframe& keyframe : problem_.keyframes) {
+      poses_[keyframe.id] = to_block(keyframe.T_odom_cam);
+    }
+    measure_edges();
+    estimate_pixel_sigma();
+    add_keyframes();
+    add_points();
+    add_edges();
+    run();
+    collect();
+    return std::move(*solution_);
+  }
+
+ private:
+  const MappingKeyframe& keyframe(KeyframeId id) const {
+    return *std::find_if(problem_.keyframes.begin(), problem_.keyframes.end(),
+                         [&](const MappingKeyframe& k) { return k.id == id; });
+  }
+
+  void measure_edges() {
+    for (const auto& [from, to] : problem_.edges_to_measure) {
+      const MappingKeyframe& a = keyframe(from);
+      const MappingKeyframe& b = keyframe(to);
+      const RegistrationResult found =
+          register_clouds(*b.cloud, *a.cloud, a.T_odom_cam.inverse() * b.T_odom_cam, problem_.gicp);
+      if (found.converged) {
+        solution_->measured.push_back({from, to, found.T_target_source, found.information});
+      }
+    }
+  }
+
+  Vector2d residual(const Observation& observation, const Vector3d& p_odom) const {
+    const Vector3d p_cam = from_block(poses_.at(observation.keyframe).data()).inverse() * p_odom;
+    return camera_.project(p_cam) - observation.pixel;
+  }
+
+  /// As in single-frame optimisation: the visual noise is what the residuals say it is.
+  void estimate_pixel_sigma() {
+    constexpr double kMedianOfRayleigh = 1.17741;
+    std::vector<double> norms;
+    for (const MappingPoint& point : problem_.points) {
+      if (point.observations.size() > 1) {
+        for (const Observation& observation : point.observations) {
+          norms.push_back(residual(observation, point.p_odom).norm());
+        }
+      }
+    }
+    sigma_px_ = problem_.pose.pixel_sigma;
+    if (!norms.empty()) {
+      const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+      std::nth_element(norms.begin(), middle, norms.end());
+      sigma_px_ = std::max(sigma_px_, *middle / kMedianOfRayleigh);
+    }
+  }
+
+  template <typename Factor, typename... Args>
+  void add_factor(ceres::LossFunction* loss, const std::vector<double*>& blocks,
+                  const Args&... args) {
+    factors_.push_back(std::make_unique<Factor>(args...));
+    ceres_.AddResidualBlock(factors_.back().get(), loss, blocks);
+  }
+
+  void add_keyframes() {
+    for (const MappingKeyframe& keyframe : problem_.keyframes) {
+      double* block = poses_.at(keyframe.id).data();
+      ceres_.AddParameterBlock(block, kPoseSize, &manifold_);
+      ordering_->AddElementToGroup(block, 1);
+      if (keyframe.fixed) {
+        ceres_.SetParameterBlockConstant(block);
+      }
+    }
+  }
+
+  void add_points() {
+    points_.reserve(problem_.points.size());
+    for (const MappingPoint& point : problem_.points) {
+      points_.push_back(point.p_odom);
+      double* block = points_.back().data();
+      ceres_.AddParameterBlock(block, 3);
+      ordering_->AddElementToGroup(block, 0);
+      for (const Observation& observation : point.observations) {
+        double* pose = poses_.at(observation.keyframe).data();
+        add_factor<ReprojectionFactor>(&visual_loss_, {pose, block}, camera_, observation.pixel,
+                                       sigma_px_);
+        if (observation.depth_m > 0) {
+          const double sigma_m =
+              problem_.mapping.depth_sigma_at_1m * observation.depth_m * observation.depth_m;
+          add_factor<PointDepthFactor>(&visual_loss_, {pose, block}, observation.depth_m, sigma_m);
+        }
+      }
+    }
+  }
+
+  void add_edges() {
+    const auto add = [&](const DepthEdge& edge) {
+      add_factor<RelativePoseFactor>(&edge_loss_,
+                                     {poses_.at(edge.from).data(), poses_.at(edge.to).data()},
+                                     edge.T_from_to, edge.information);
+    };
+    std::for_each(problem_.edges.begin(), problem_.edges.end(), add);
+    std::for_each(solution_->measured.begin(), solution_->measured.end(), add);
+  }
+
+  void run() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = ordering_;
+    options.max_num_iterations = problem_.mapping.iterations;
+    options.num_threads = 1;  // threads would sum in another order each time
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &ceres_, &summary);
+  }
+
+  void collect() {
+    constexpr double kChi2Of2At99Percent = 9.21;
+    for (const MappingKeyframe& keyframe : problem_.keyframes) {
+      if (!keyframe.fixed) {
+        solution_->T_odom_cam.emplace(keyframe.id, from_block(poses_.at(keyframe.id).data()));
+      }
+    }
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const MappingPoint& point = problem_.points[i];
+      solution_->p_odom.emplace(point.id, points_[i]);
+      for (const Observation& observation : point.observations) {
+        const double chi2 =
+            residual(observation, points_[i]).squaredNorm() / (sigma_px_ * sigma_px_);
+        if (!(chi2 < kChi2Of2At99Percent)) {
+          solution_->outliers.emplace_back(point.id, observation.keyframe);
+        }
+      }
+    }
+  }
+
+  const MappingProblem& problem_;
+  CameraModel camera_;
+  std::map<KeyframeId, PoseBlock> poses_;
+  std::vector<Vector3d> points_;
+  double sigma_px_ = 1;
+  std::unique_ptr<MappingSolution> solution_;
+  PoseManifold manifold_;
+  ceres::CauchyLoss visual_loss_{kCauchyWidth};
+  ceres::HuberLoss edge_loss_{kHuberWidth};
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_ =
+      std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<std::unique_ptr<ceres::CostFunction>> factors_;
+  ceres::Problem ceres_{keep_ownership()};
+
+  static ceres::Problem::Options keep_ownership() {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+};
+
+}  // namespace
+
+MappingResult optimise(const MappingTask& task, StageObserver* observer) {
+  const StageScope scope{observer, Stage::kMapping};
+  return {std::make_shared<const MappingSolution>(LocalBundleAdjustment{*task.problem}.solve())};
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,150 @@
+#include "vision/dual_stream_flow.hpp"
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "vision/image_pyramid.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+cv::Point2f to_cv(const Vector2d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y())};
+}
+Vector2d from_cv(const cv::Point2f& p) {
+  return {static_cast<double>(p.x), static_cast<double>(p.y)};
+}
+
+struct LucasKanade {
+  int window_px;
+  int levels;
+
+  /// Moves `to` from its start to where the patches around `from` are found; false where they are
+  /// not.
+  std::vector<unsigned char> operator()(const ImagePyramid& a, const ImagePyramid& b,
+                                        const std::vector<cv::Point2f>& from,
+                                        std::vector<cv::Point2f>& to) const {
+    constexpr int kIterations = 20;
+    constexpr double kStep = 0.03;
+    constexpr double kMinimumEigenvalue = 1e-4;
+    std::vector<unsigned char> found;
+    std::vector<float> error;
+    cv::calcOpticalFlowPyrLK(a.levels(), b.levels(), from, to, found, error,
+                             cv::Size{window_px, window_px}, levels,
+                             {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kIterations, kStep},
+                             cv::OPTFLOW_USE_INITIAL_FLOW, kMinimumEigenvalue);
+    return found;
+  }
+};
+
+}  // namespace
+
+void DualStreamFlow::track_stream(const ImagePyramid& previous, const ImagePyramid& current,
+                                  std::span<const FlowSeed> seeds,
+                                  const std::vector<std::size_t>& chosen, bool from_prediction,
+                                  std::vector<std::optional<Vector2d>>& tracks) const {
+  if (chosen.empty()) {
+    return;
+  }
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  for (const std::size_t i : chosen) {
+    from.push_back(to_cv(seeds[i].previous));
+    to.push_back(from_prediction ? to_cv(*seeds[i].predicted) : from.back());
+  }
+  const int levels = from_prediction ? config_.prior_levels : config_.levels;
+  const auto found = LucasKanade{config_.window_px, levels}(previous, current, from, to);
+  std::vector<cv::Point2f> back = from;
+  const auto found_back = LucasKanade{config_.window_px, 0}(current, previous, to, back);
+
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const Vector2d pixel = from_cv(to[k]);
+    const bool consistent =
+        found[k] != 0 && found_back[k] != 0 &&
+        (from_cv(back[k]) - from_cv(from[k])).norm() <= config_.forward_backward_px;
+    if (consistent && camera_.contains(pixel, 1)) {
+      tracks[chosen[k]] = pixel;
+    }
+  }
+}
+
+void DualStreamFlow::reject_by_epipolar_geometry(
+    std::span<const FlowSeed> seeds, std::vector<std::optional<Vector2d>>& tracks) const {
+  constexpr std::size_t kEnoughForRansac = 16;  // twice the eight that determine the matrix
+  constexpr double kConfidence = 0.99;
+  std::vector<std::size_t> index;
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    if (tracks[i]) {
+      index.push_back(i);
+      from.push_back(to_cv(camera_.undistort(seeds[i].previous)));
+      to.push_back(to_cv(camera_.undistort(*tracks[i])));
+    }
+  }
+  if (index.size() < kEnoughForRansac) {
+    return;
+  }
+  std::vector<unsigned char> inlier;
+  const cv::Mat fundamental = cv::findFundamentalMat(
+      from, to, cv::FM_RANSAC, config_.fundamental_threshold_px, kConfidence, inlier);
+  if (fundamental.empty()) {
+    return;
+  }
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    if (inlier[k] == 0) {
+      tracks[index[k]].reset();
+    }
+  }
+}
+
+void DualStreamFlow::reject_double_occupancy(std::vector<std::optional<Vector2d>>& tracks) const {
+  constexpr int kCellPx = 4;
+  const int columns = camera_.intrinsics().width / kCellPx + 1;
+  const int rows = camera_.intrinsics().height / kCellPx + 1;
+  cv::Mat1b occupied(rows, columns, static_cast<unsigned char>(0));
+  for (auto& track : tracks) {
+    if (!track) {
+      continue;
+    }
+    unsigned char& cell =
+        occupied(static_cast<int>(track->y()) / kCellPx, static_cast<int>(track->x()) / kCellPx);
+    if (cell != 0) {
+      track.reset();
+    }
+    cell = 1;
+  }
+}
+
+std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& previous,
+                                                           const ImagePyramid& current,
+                                                           std::span<const FlowSeed> seeds) const {
+  std::vector<std::optional<Vector2d>> tracks(seeds.size());
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    if (seeds[i].predicted && camera_.contains(*seeds[i].predicted, 1)) {
+      chosen.push_back(i);
+    }
+  }
+  track_stream(previous, current, seeds, chosen, true, tracks);
+  chosen.clear();
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    if (!tracks[i]) {
+      chosen.push_back(i);
+    }
+  }
+  track_stream(previous, current, seeds, chosen, false, tracks);
+  reject_by_epipolar_geometry(seeds, tracks);
+  reject_double_occupancy(tracks);
+  return tracks;
+}
+
+}  // namespace geoflow::slam
