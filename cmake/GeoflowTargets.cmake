@@ -35,13 +35,17 @@ target_compile_options(geoflow_options INTERFACE
 # fmt 9 and GCC 12's optimiser disagree about null and array bounds inside inlined library code.
 target_compile_options(geoflow_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference>)
 target_compile_definitions(geoflow_options INTERFACE
-  $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS;EIGEN_INITIALIZE_MATRICES_BY_NAN>
-  $<$<NOT:$<OR:$<CONFIG:Debug>,$<BOOL:${GEOFLOW_SANITIZE}>>>:_FORTIFY_SOURCE=2>)
+  $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS;EIGEN_INITIALIZE_MATRICES_BY_NAN>)
 if(GEOFLOW_SANITIZE)
   target_compile_options(geoflow_options INTERFACE -fsanitize=${GEOFLOW_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
   target_link_options(geoflow_options INTERFACE -fsanitize=${GEOFLOW_SANITIZE})
   target_compile_definitions(geoflow_options INTERFACE _GLIBCXX_ASSERTIONS)
+else()
+  target_compile_definitions(geoflow_options INTERFACE $<$<NOT:$<CONFIG:Debug>>:_FORTIFY_SOURCE=2>)
+endif()
+if(GEOFLOW_FUZZ)
+  target_compile_options(geoflow_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 # What nearly every source includes; precompiled once per part. Sources still include all that they use: the presets clang
@@ -87,4 +91,26 @@ function(geoflow_test name)
   # One label with slashes: gtest_discover_tests cannot pass on a list.
   list(JOIN ARG_LABELS "/" label)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES LABELS "${label}" TIMEOUT 600)
+endfunction()
+
+# geoflow_fuzz(NAME SOURCES … DEPENDS … [PRIVATE_OF part …])
+# The fuzz target of one decoder, NAME_fuzz in fuzz/: its source defines LLVMFuzzerTestOneInput. With GEOFLOW_FUZZ (preset fuzz)
+# it is linked with libFuzzer, and .ci/run runs it for a minute; otherwise with seeds_main.cpp, as a test that runs the
+# seeds in tests/fuzz/seeds/NAME and mutations of them.
+function(geoflow_fuzz name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_OF" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} geoflow_options)
+  foreach(part IN LISTS ARG_PRIVATE_OF)
+    target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/${part}")
+  endforeach()
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/fuzz")
+  if(GEOFLOW_FUZZ)
+    target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  else()
+    target_sources(${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests/fuzz/seeds_main.cpp")
+    string(REGEX REPLACE "_fuzz$" "" short ${name})
+    add_test(NAME fuzz.${short} COMMAND ${name} "${PROJECT_SOURCE_DIR}/tests/fuzz/seeds/${short}")
+    set_tests_properties(fuzz.${short} PROPERTIES LABELS fast/fuzz TIMEOUT 300)
+  endif()
 endfunction()

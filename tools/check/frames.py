@@ -7,6 +7,7 @@ By the convention of hal/geometry.hpp `T_a_b` maps coordinates in b to coordinat
   T_a_d = T_a_b * T_b_c       is refused because the outer frames are a and c,
   T_a_b = T_b_a               is refused: .inverse() is missing.
 `const SE3& T_odom_anchor = anchor.T_odom_cam` is how the pose of another object gets the name that a product needs.
+The roles parent, child, target and source take any frame: `.T_parent_child = T_odom_base`.
 Inverses and transposes swap the frames. Digits tell instances of a frame (cam0, cam1): two numbers must agree, a name
 without a number fits any. `// frames: REASON` on the line of the product excuses it.
 """
@@ -24,6 +25,8 @@ SWAPPING = {"inverse", "transpose", "conjugate"}
 KEEPING = {"rotation", "rotation_matrix", "toRotationMatrix", "matrix", "linear", "adjoint", "cast", "value", "eval",
            "normalized", "get"}
 TO_VECTOR = {"translation"}
+# Names of roles that any frame may take when it is passed on.
+ROLES = {"parent", "child", "target", "source"}
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
@@ -43,6 +46,11 @@ def agree(a, b):
     name_a, name_b = a.rstrip("0123456789"), b.rstrip("0123456789")
     digits_a, digits_b = a[len(name_a):], b[len(name_b):]
     return name_a == name_b and (digits_a == digits_b or not digits_a or not digits_b)
+
+
+def fits(role, frame):
+    """May a transform with this frame be given to a name with that one?"""
+    return role in ROLES or agree(role, frame)
 
 
 def tokenise(text):
@@ -171,7 +179,7 @@ def check_assignment(path, target, operands):
     same_kind = (target.right is None) == (right is None)
     if not all(operand.known for operand in operands) or not same_kind:
         return
-    if not agree(target.left, left) or (right and not agree(target.right, right)):
+    if not fits(target.left, left) or (right and not fits(target.right, right)):
         product = " * ".join(operand.text for operand in operands)
         yield source.Finding(path, operands[0].line, f"outer frames differ: {target.text} = {product}")
 

@@ -13,6 +13,7 @@ import os
 import re
 import sys
 from collections import defaultdict
+from fnmatch import fnmatch
 
 import source
 
@@ -26,6 +27,7 @@ OWNED = re.compile(r"unique_ptr<[\w:<>, ]*>\s*\w*\s*[({]\s*$")
 DELETE = re.compile(r"(?<!=)(?<!= )(?<!operator )\bdelete\b")
 SLEEP = re.compile(r"\b(usleep|nanosleep|sleep_for|sleep_until)\s*\(|(?<![\w.>])sleep\s*\(")
 LATER = re.compile(r"\b(TO" + r"DO|FIX" + r"ME|XX" + r"X|HA" + r"CK)\b")
+CMAKE_FILE = re.compile(r"(?:\$\{CMAKE_CURRENT_SOURCE_DIR\}/)?([\w/.*-]+\.cpp)")
 # Lines that many files must share say nothing about a run.
 TRIVIAL = re.compile(r"^(#.*|using .*|namespace .*|[{}()\[\];,]*|(public|private|protected):|break;|default:)$")
 
@@ -62,7 +64,7 @@ def check_words(path, text):
 
 
 def check_built(project):
-    """Every .cpp is named in the CMakeLists.txt of its folder or of one above."""
+    """Every .cpp is named, or matched by a pattern, in the CMakeLists.txt of its folder or of one above."""
     for path, _ in project.cpp():
         if not path.endswith(".cpp"):
             continue
@@ -70,7 +72,7 @@ def check_built(project):
         while not named:
             lists = project.files.get(os.path.join(folder, "CMakeLists.txt"), "")
             name = os.path.relpath(path, folder or ".")
-            named = re.search(rf"(?<![\w/.-]){re.escape(name)}(?![\w/.-])", lists) is not None
+            named = any(fnmatch(name, word) for word in CMAKE_FILE.findall(lists))
             if not folder:
                 break
             folder = os.path.dirname(folder)

@@ -84,6 +84,10 @@ class Products(unittest.TestCase):
         self.assert_refuses("const SE3& T_odom_anchor = anchor.T_map_cam;", "outer")
         self.assert_refuses("const SE3& T_odom_anchor = T_odom_cam;", "outer")
 
+    def test_a_role_takes_any_frame(self):
+        self.assert_accepts("send({.T_parent_child = T_odom_base});")
+        self.assert_refuses("auto x = T_odom_base * T_parent_child;")
+
     def test_a_reason_excuses(self):
         self.assert_accepts("auto x = T_a_b * T_c_d;  // frames: b is c in the first packet")
         self.assert_refuses("auto x = T_a_b * T_c_d;  // frames:")

@@ -57,6 +57,11 @@ class Built(unittest.TestCase):
         lost = findings({**lists, "tests/hal/aa_test.cpp": "", "tests/hal/b_test.cpp": ""})
         self.assertEqual([finding.path for finding in lost], ["tests/hal/aa_test.cpp", "tests/hal/b_test.cpp"])
 
+    def test_a_pattern_names_too(self):
+        lists = {"tests/fuzz/CMakeLists.txt": 'file(GLOB sources "${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp")'}
+        lost = findings({**lists, "tests/fuzz/a_fuzz.cpp": "", "tests/fuzz/a.cpp": ""})
+        self.assertEqual([finding.path for finding in lost], ["tests/fuzz/a.cpp"])
+
 
 class Runs(unittest.TestCase):
     lists = {"slam/CMakeLists.txt": "a.cpp b.cpp"}
