@@ -128,7 +128,7 @@ Result<Eigen::Quaterniond> checked_rotation(const Eigen::Quaterniond& q, const P
 
 Result<StampedPose> parse_tum(const Columns& columns, const Place& place) {
   const auto t = parse_decimal_seconds(columns.text[0]);
-  if (!t) {
+  if (!t || std::chrono::abs(*t) > kMaxTrajectoryTime) {
     return fail_at(place, "column 1: '{}' is not a time in seconds", shown(columns.text[0]));
   }
   std::array<double, kTumColumns - 1> v{};  // x y z qx qy qz qw
@@ -144,7 +144,8 @@ Result<StampedPose> parse_euroc(const Columns& columns, const Place& place) {
   const std::string_view text = columns.text[0];
   std::int64_t ns = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), ns);
-  if (status != std::errc{} || end != text.data() + text.size()) {
+  if (status != std::errc{} || end != text.data() + text.size() ||
+      ns > kMaxTrajectoryTime.count() || ns < -kMaxTrajectoryTime.count()) {
     return fail_at(place, "column 1: '{}' is not a time in integer nanoseconds", shown(text));
   }
   std::array<double, kEurocColumns - 1> v{};  // x y z qw qx qy qz
@@ -159,7 +160,7 @@ Result<StampedPose> parse_euroc(const Columns& columns, const Place& place) {
   });
 }
 
-Result<StampedPose> parse_kitti(const Columns& columns, const Place& place, std::size_t index) {
+Result<StampedPose> parse_kitti(const Columns& columns, const Place& place, TrajectoryFile& file) {
   using Matrix34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
   Matrix34 T_ref_body;
   if (auto done = parse_numbers(columns, 0, kKittiColumns, place, T_ref_body.data()); !done) {
@@ -173,12 +174,13 @@ Result<StampedPose> parse_kitti(const Columns& columns, const Place& place, std:
                    "{:.3g}, its determinant is {:.3g})",
                    deviation, M.determinant());
   }
-  const Duration t = std::chrono::seconds{static_cast<std::int64_t>(index)};
+  file.matrices.push_back(M);
+  const Duration t = std::chrono::seconds{static_cast<std::int64_t>(file.poses.size())};
   return StampedPose{.t = HostTime{t}, .pose = SE3{M, Vector3d{T_ref_body.col(3)}}};
 }
 
 Result<StampedPose> parse_line(std::string_view line, TrajectoryFormat format, const Place& place,
-                               std::size_t index) {
+                               TrajectoryFile& file) {
   const Columns columns = split(line, format);
   switch (format) {
     case TrajectoryFormat::kTum:
@@ -191,7 +193,7 @@ Result<StampedPose> parse_line(std::string_view line, TrajectoryFormat format, c
       if (columns.count != kKittiColumns) {
         return fail_at(place, "expected the 12 numbers of a 3 x 4 matrix, found {}", columns.count);
       }
-      return parse_kitti(columns, place, index);
+      return parse_kitti(columns, place, file);
     case TrajectoryFormat::kEuroc:
       if (columns.count < kEurocColumns) {
         return fail_at(place,
@@ -256,7 +258,7 @@ Result<TrajectoryFile> parse_trajectory(std::string_view text, std::string_view 
       }
       format = *detected;
     }
-    auto pose = parse_line(line, *format, place, file.poses.size());
+    auto pose = parse_line(line, *format, place, file);
     if (!pose) {
       return tl::unexpected{std::move(pose).error()};
     }

@@ -8,7 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
 
 /// Trajectories as text files. Times are read and written as integer nanoseconds, never through a
@@ -30,10 +32,17 @@ enum class TrajectoryFormat : std::uint8_t {
 struct TrajectoryFile {
   Trajectory poses;  ///< in strictly ascending order of time
   TrajectoryFormat format = TrajectoryFormat::kTum;
+  /// KITTI only, one for each pose: the 3 x 3 rotations as written, orthonormal up to the file's
+  /// rounding.
+  std::vector<Matrix3d> matrices{};
   /// Sentences on what was put right: lines that were out of order (sorted) and times that occur
   /// twice (the first one counts).
   std::vector<std::string> warnings;
 };
+
+/// Times further from zero than this (142 years) are refused, so that differences of times cannot
+/// overflow.
+inline constexpr Duration kMaxTrajectoryTime{4'500'000'000'000'000'000};
 
 /// Files larger than this are refused before they are read into memory.
 inline constexpr std::size_t kMaxTrajectoryFileBytes = std::size_t{1} << 29U;

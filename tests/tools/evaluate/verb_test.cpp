@@ -1,0 +1,131 @@
+#include "geoflow/tools/verb.hpp"
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "geoflow/tools/run.hpp"
+#include "tests/support/data.hpp"
+
+namespace geoflow::tools {
+
+std::unique_ptr<Verb> make_evaluate_verb();
+
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class EvaluateVerbTest : public testing::Test {
+ protected:
+  EvaluateVerbTest() {
+    std::ofstream reference{folder_.path() / "reference.txt"};
+    std::ofstream estimate{folder_.path() / "estimate.txt"};
+    for (int i = 0; i < 40; ++i) {
+      const double t = 0.1 * i;
+      reference << t << " " << t << " " << t * t << " 0 0 0 0 1\n";
+      estimate << t << " " << t << " " << t * t << " " << (i % 2 == 0 ? 0.01 : -0.01)
+               << " 0 0 0 1\n";
+    }
+  }
+
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (folder_.path() / name).string();
+  }
+
+  int run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"geoflow", "evaluate"});
+    std::vector<const char*> argv;
+    for (const std::string& argument : arguments) {
+      argv.push_back(argument.c_str());
+    }
+    std::vector<std::unique_ptr<Verb>> verbs;
+    verbs.push_back(make_evaluate_verb());
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code =
+        run_command("test", std::move(verbs), static_cast<int>(argv.size()), argv.data());
+    out_ = testing::internal::GetCapturedStdout();
+    err_ = testing::internal::GetCapturedStderr();
+    return code;
+  }
+
+  [[nodiscard]] std::string content(const std::string& name) const {
+    std::ifstream stream{file(name), std::ios::binary};
+    return {std::istreambuf_iterator<char>{stream}, {}};
+  }
+
+  tests::TemporaryDirectory folder_;
+  std::string out_;
+  std::string err_;
+};
+
+TEST_F(EvaluateVerbTest, PrintsJsonWithItsDocumentedKeys) {
+  ASSERT_EQ(run({file("estimate.txt"), file("reference.txt"), "--align", "none", "--correct-within",
+                 "0.02", "--json"}),
+            0)
+      << err_;
+  const auto json = nlohmann::json::parse(out_);
+  EXPECT_NEAR(json.at("ate").at("translation_m").at("rmse").get<double>(), 0.01, 1e-9);
+  EXPECT_EQ(json.at("ate").at("rotation_deg").at("max"), 0.0);
+  EXPECT_EQ(json.at("pairs"), 40);
+  EXPECT_NEAR(json.at("duration_s").get<double>(), 3.9, 1e-9);
+  EXPECT_EQ(json.at("estimate").at("format"), "tum");
+  EXPECT_EQ(json.at("rpe").at("unit"), "s");
+  EXPECT_EQ(json.at("alignment").at("kind"), "none");
+  EXPECT_EQ(json.at("correct_rate").at("rate"), 1.0);
+  EXPECT_NEAR(json.at("path_m").at("reference").get<double>(), 16.06, 0.5);
+}
+
+TEST_F(EvaluateVerbTest, PrintsATable) {
+  ASSERT_EQ(run({file("estimate.txt"), file("reference.txt")}), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("absolute error"));
+  EXPECT_THAT(out_, HasSubstr("relative error over 1 s"));
+  EXPECT_THAT(out_, HasSubstr("alignment  se3"));
+}
+
+TEST_F(EvaluateVerbTest, WritesPlotsAndTheTable) {
+  ASSERT_EQ(run({file("estimate.txt"), file("reference.txt"), "--plot", file("a.png"), "--table",
+                 file("a.csv")}),
+            0)
+      << err_;
+  ASSERT_EQ(run({file("estimate.txt"), file("reference.txt"), "--plot", file("a.svg")}), 0) << err_;
+  EXPECT_THAT(content("a.png"), StartsWith("\x89PNG"));
+  EXPECT_THAT(content("a.svg"), HasSubstr("<svg"));
+  const std::string csv = content("a.csv");
+  EXPECT_THAT(csv, StartsWith("timestamp_ns,estimate_x_m"));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 41);
+}
+
+TEST_F(EvaluateVerbTest, ExitsWithItsDocumentedCodes) {
+  EXPECT_EQ(run({file("estimate.txt"), file("reference.txt"), "--max-ate", "0.02"}), 0);
+  EXPECT_EQ(run({file("estimate.txt"), file("reference.txt"), "--max-ate", "0.001"}), 1);
+  EXPECT_THAT(err_, HasSubstr("is above 0.001 m"));
+  EXPECT_EQ(run({file("estimate.txt"), file("reference.txt"), "--align", "mirror"}), 2);
+  EXPECT_EQ(run({file("estimate.txt"), file("reference.txt"), "--delta", "-1"}), 2);
+  EXPECT_EQ(run({file("estimate.txt"), file("reference.txt"), "--plot", file("a.bmp")}), 2);
+  EXPECT_EQ(run({file("estimate.txt")}), 2);
+  EXPECT_EQ(run({file("estimate.txt"), file("none.txt")}), 3);
+  EXPECT_THAT(err_, HasSubstr("none.txt"));
+  std::ofstream{file("garbage.txt")} << "\x7f" << "ELF \x01\x02\n";
+  EXPECT_EQ(run({file("garbage.txt"), file("reference.txt"), "--json"}), 3);
+  EXPECT_EQ(nlohmann::json::parse(out_).at("error").at("code"), "invalid_data");
+  EXPECT_THAT(err_, HasSubstr("garbage.txt:1:"));
+}
+
+TEST_F(EvaluateVerbTest, ShowsExamples) {
+  EXPECT_EQ(run({"--help"}), 0);
+  EXPECT_THAT(out_, HasSubstr("--max-difference"));
+  EXPECT_THAT(out_, HasSubstr("geoflow evaluate out/final_camera.txt groundtruth.txt"));
+}
+
+}  // namespace
+}  // namespace geoflow::tools
