@@ -10,6 +10,8 @@
 #include "geoflow/hal/result.hpp"
 
 #include "replay/bag/reader.hpp"
+#include "replay/euroc/reader.hpp"
+#include "replay/openloris/reader.hpp"
 #include "replay/reader.hpp"
 #include "replay/tum/reader.hpp"
 
@@ -32,9 +34,16 @@ constexpr std::array kFormats = {
                [](const RecordingOptions& options) {
                  return bag::open(options.path, options.topics);
                }},
+    Format{.description = "OpenLORIS-Scene (color.txt and aligned_depth.txt)",
+           .looks_like = openloris::looks_like,
+           .open = [](const RecordingOptions& options) { return openloris::open(options.path); }},
     Format{.description = "TUM RGB-D (rgb.txt and depth.txt, or associations.txt)",
            .looks_like = tum::looks_like,
            .open = [](const RecordingOptions& options) { return tum::open(options.path); }},
+    Format{.description =
+               "EuRoC IMU (a .csv file, or mav0/imu0/data.csv, imu0/data.csv, imu.csv, data.csv)",
+           .looks_like = [](const Path& path) { return euroc::find_csv(path).has_value(); },
+           .open = [](const RecordingOptions& options) { return euroc::open(options.path); }},
 };
 
 }  // namespace

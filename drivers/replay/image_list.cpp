@@ -24,6 +24,7 @@
 namespace geoflow::drivers {
 namespace {
 
+constexpr std::size_t kLargestList = std::size_t{64} << 20U;
 constexpr std::size_t kLargestImageFile = std::size_t{64} << 20U;
 
 Result<ListedImage> parse_entry(std::string_view list, std::size_t line, std::string_view stamp,
@@ -38,6 +39,29 @@ Result<ListedImage> parse_entry(std::string_view list, std::size_t line, std::st
 
 bool names_depth(std::string_view file) {
   return file.find("depth") != std::string_view::npos;
+}
+
+Result<void> check_files(const std::filesystem::path& directory,
+                         const std::vector<ListedImage>& images) {
+  const ListedImage* first = nullptr;
+  std::size_t missing = 0;
+  for (const ListedImage& image : images) {
+    std::error_code error;
+    if (std::filesystem::is_regular_file(directory / image.file, error)) {
+      continue;
+    }
+    ++missing;
+    if (first == nullptr || std::tie(image.list, image.line) < std::tie(first->list, first->line)) {
+      first = &image;
+    }
+  }
+  if (first != nullptr) {
+    return fail(
+        ErrorCode::kNotFound, "{}: no such file ({} of the {} listed files missing)",
+        (directory / first->list).string() + fmt::format(":{}: {}", first->line, first->file),
+        missing, images.size());
+  }
+  return {};
 }
 
 }  // namespace
@@ -99,33 +123,35 @@ Result<std::vector<ListedImage>> parse_associations(std::string_view list,
   return images;
 }
 
-void sort_by_time(std::vector<ListedImage>& images) {
-  std::ranges::stable_sort(images, [](const ListedImage& a, const ListedImage& b) {
-    return std::tie(a.t, a.stream) < std::tie(b.t, b.stream);
+Result<std::vector<ListedImage>> load_image_list(const std::filesystem::path& directory,
+                                                 std::string_view list, ImageStream stream) {
+  const std::string path = (directory / list).string();
+  return text::read_file(path, kLargestList).and_then([&](const std::string& content) {
+    return parse_image_list(list, content, stream).map_error([&](Error error) {
+      return std::move(error).in(directory.string());
+    });
   });
 }
 
-Result<void> check_files(const std::filesystem::path& directory,
-                         const std::vector<ListedImage>& images) {
-  const ListedImage* first = nullptr;
-  std::size_t missing = 0;
-  for (const ListedImage& image : images) {
-    std::error_code error;
-    if (std::filesystem::is_regular_file(directory / image.file, error)) {
-      continue;
-    }
-    ++missing;
-    if (first == nullptr || std::tie(image.list, image.line) < std::tie(first->list, first->line)) {
-      first = &image;
-    }
+Result<std::vector<ListedImage>> load_associations(const std::filesystem::path& directory,
+                                                   std::string_view list) {
+  return text::read_file(directory / list, kLargestList).and_then([&](const std::string& content) {
+    return parse_associations(list, content).map_error([&](Error error) {
+      return std::move(error).in(directory.string());
+    });
+  });
+}
+
+Result<void> prepare_images(const std::filesystem::path& directory,
+                            std::vector<ListedImage>& images) {
+  if (images.empty()) {
+    return fail(ErrorCode::kInvalidData, "{}: its lists name no image", directory.string());
   }
-  if (first != nullptr) {
-    return fail(
-        ErrorCode::kNotFound, "{}: no such file ({} of the {} listed files missing)",
-        (directory / first->list).string() + fmt::format(":{}: {}", first->line, first->file),
-        missing, images.size());
-  }
-  return {};
+  auto checked = check_files(directory, images);
+  std::ranges::stable_sort(images, [](const ListedImage& a, const ListedImage& b) {
+    return std::tie(a.t, a.stream) < std::tie(b.t, b.stream);
+  });
+  return checked;
 }
 
 Result<Event> read_image(const std::filesystem::path& directory, const ListedImage& image) {

@@ -38,13 +38,17 @@ struct ListedImage {
 [[nodiscard]] Result<std::vector<ListedImage>> parse_associations(std::string_view list,
                                                                   std::string_view content);
 
-/// In order of time, colour before depth where equal; the lists' order is kept otherwise.
-void sort_by_time(std::vector<ListedImage>& images);
+/// A list file of `directory`, of at most 64 MiB.
+[[nodiscard]] Result<std::vector<ListedImage>> load_image_list(
+    const std::filesystem::path& directory, std::string_view list, ImageStream stream);
+[[nodiscard]] Result<std::vector<ListedImage>> load_associations(
+    const std::filesystem::path& directory, std::string_view list);
 
-/// That every file exists under `directory`; an Error names the first that does not and how many
-/// there are.
-[[nodiscard]] Result<void> check_files(const std::filesystem::path& directory,
-                                       const std::vector<ListedImage>& images);
+/// Checks that there are images and that every file exists under `directory` (an Error names the
+/// first that does not and how many there are), and sorts them by time, colour before depth where
+/// equal and the lists' order kept otherwise.
+[[nodiscard]] Result<void> prepare_images(const std::filesystem::path& directory,
+                                          std::vector<ListedImage>& images);
 
 /// The event of one image file, its bytes read but not decoded.
 [[nodiscard]] Result<Event> read_image(const std::filesystem::path& directory,

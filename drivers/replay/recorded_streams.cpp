@@ -24,6 +24,8 @@
 #include "replay/calibration/find.hpp"
 #include "replay/decode.hpp"
 #include "replay/factory.hpp"
+#include "replay/faults/reader.hpp"
+#include "replay/faults/script.hpp"
 #include "replay/port.hpp"
 #include "replay/prefetcher.hpp"
 #include "replay/reader.hpp"
@@ -213,6 +215,13 @@ Result<std::unique_ptr<RecordedStreams>> RecordedStreams::open(const RecordingOp
   auto calibration = find_calibration(options, **reader);
   if (!calibration) {
     return tl::unexpected{std::move(calibration.error())};
+  }
+  if (options.faults) {
+    auto script = faults::load_script(*options.faults);
+    if (!script) {
+      return tl::unexpected{std::move(script.error())};
+    }
+    reader = faults::with_faults(*std::move(reader), *std::move(script), options.fault_seed);
   }
   return std::unique_ptr<RecordedStreams>{new RecordedStreams{
       std::make_unique<Implementation>(*std::move(reader), *std::move(calibration), options)}};

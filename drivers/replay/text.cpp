@@ -13,7 +13,10 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -21,7 +24,6 @@
 namespace geoflow::drivers::text {
 namespace {
 
-constexpr std::size_t kLongestLine = 4096;
 constexpr std::string_view kBlanks = " \t";
 constexpr std::size_t kNanosecondDigits = 9;
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
@@ -49,29 +51,37 @@ std::optional<std::int64_t> parse_whole(std::string_view text) noexcept {
 
 }  // namespace
 
+Result<std::string_view> data_of(std::string_view line) {
+  if (line.size() > kLongestLine) {
+    return fail(ErrorCode::kInvalidData, "a line of {} bytes, at most {} are allowed", line.size(),
+                kLongestLine);
+  }
+  if (line.find('\0') != std::string_view::npos) {
+    return fail(ErrorCode::kInvalidData, "a zero byte in a text file");
+  }
+  if (!line.empty() && line.back() == '\r') {
+    line.remove_suffix(1);
+  }
+  line = trim(line);
+  return line.starts_with('#') ? std::string_view{} : line;
+}
+
 Result<void> for_each_line(std::string_view name, std::string_view content,
                            const std::function<Result<void>(const Line&)>& use) {
   std::size_t number = 0;
   while (!content.empty()) {
     ++number;
     const std::size_t end = content.find('\n');
-    std::string_view line = content.substr(0, end);
+    const std::string_view line = content.substr(0, end);
     content.remove_prefix(end == std::string_view::npos ? content.size() : end + 1);
-    if (line.size() > kLongestLine) {
-      return fail(ErrorCode::kInvalidData, "{}:{}: a line of {} bytes, at most {} are allowed",
-                  name, number, line.size(), kLongestLine);
+    auto data = data_of(line);
+    if (!data) {
+      return tl::unexpected{std::move(data.error()).in(fmt::format("{}:{}", name, number))};
     }
-    if (line.find('\0') != std::string_view::npos) {
-      return fail(ErrorCode::kInvalidData, "{}:{}: a zero byte in a text file", name, number);
-    }
-    if (!line.empty() && line.back() == '\r') {
-      line.remove_suffix(1);
-    }
-    line = trim(line);
-    if (line.empty() || line.front() == '#') {
+    if (data->empty()) {
       continue;
     }
-    if (auto used = use(Line{.number = number, .text = line}); !used) {
+    if (auto used = use(Line{.number = number, .text = *data}); !used) {
       return used;
     }
   }

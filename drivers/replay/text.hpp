@@ -20,6 +20,12 @@ struct Line {
   std::string_view text;
 };
 
+inline constexpr std::size_t kLongestLine = 4096;  ///< [B]
+
+/// What of a line without its LF is data: no CR, no blanks around it; empty for a comment. An Error
+/// (without place) if it is longer than kLongestLine or has a NUL byte.
+[[nodiscard]] Result<std::string_view> data_of(std::string_view line);
+
 /// Calls `use` for every data line of `content` until it fails. `name` stands before the line
 /// number in errors. Lines that start with '#' are comments; a NUL byte or a line of over 4096
 /// bytes is an error.

@@ -19,12 +19,10 @@
 
 #include "replay/image_list.hpp"
 #include "replay/reader.hpp"
-#include "replay/text.hpp"
 
 namespace geoflow::drivers::tum {
 namespace {
 
-constexpr std::size_t kLargestList = std::size_t{64} << 20U;
 constexpr std::string_view kColorList = "rgb.txt";
 constexpr std::string_view kDepthList = "depth.txt";
 constexpr std::array<std::string_view, 4> kAssociations = {"associations.txt", "association.txt",
@@ -45,38 +43,19 @@ bool has_lists(const std::filesystem::path& directory) {
   return has(directory, kColorList) && has(directory, kDepthList);
 }
 
-Result<std::vector<ListedImage>> read_list(const std::filesystem::path& directory,
-                                           std::string_view list, ImageStream stream) {
-  const auto path = directory / list;
-  return text::read_file(path, kLargestList).and_then([&](const std::string& content) {
-    return parse_image_list(list, content, stream).map_error([&](Error error) {
-      return std::move(error).in(directory.string());
-    });
-  });
-}
-
-Result<std::vector<ListedImage>> read_associations(const std::filesystem::path& directory,
-                                                   std::string_view list) {
-  return text::read_file(directory / list, kLargestList).and_then([&](const std::string& content) {
-    return parse_associations(list, content).map_error([&](Error error) {
-      return std::move(error).in(directory.string());
-    });
-  });
-}
-
 Result<std::vector<ListedImage>> read_lists(const std::filesystem::path& directory) {
   if (!has_lists(directory)) {
     const auto list = associations_of(directory);
     if (!list) {
       return fail(ErrorCode::kNotFound, "{}: neither {}", directory.string(), expected_files());
     }
-    return read_associations(directory, *list);
+    return load_associations(directory, *list);
   }
-  auto images = read_list(directory, kColorList, ImageStream::kColor);
+  auto images = load_image_list(directory, kColorList, ImageStream::kColor);
   if (!images) {
     return images;
   }
-  auto depth = read_list(directory, kDepthList, ImageStream::kDepth);
+  auto depth = load_image_list(directory, kDepthList, ImageStream::kDepth);
   if (!depth) {
     return depth;
   }
@@ -140,13 +119,9 @@ Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& direc
   if (!images) {
     return tl::unexpected{std::move(images.error())};
   }
-  if (images->empty()) {
-    return fail(ErrorCode::kInvalidData, "{}: its lists name no image", directory.string());
+  if (auto prepared = prepare_images(directory, *images); !prepared) {
+    return tl::unexpected{std::move(prepared.error())};
   }
-  if (auto checked = check_files(directory, *images); !checked) {
-    return tl::unexpected{std::move(checked.error())};
-  }
-  sort_by_time(*images);
   return std::make_unique<Reader>(directory, *std::move(images));
 }
 
