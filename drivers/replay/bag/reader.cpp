@@ -1,5 +1,7 @@
 #include "replay/bag/reader.hpp"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -9,6 +11,7 @@
 
 #include <tl/expected.hpp>
 
+#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -66,6 +69,20 @@ Result<Event> sample_event(const BagMessage& message) {
   });
 }
 
+std::optional<StreamId> stream_of_topic(const TopicChoice& choice, std::string_view topic) {
+  if (topic.empty()) {
+    return std::nullopt;
+  }
+  const std::array<std::pair<std::string_view, StreamId>, kStreamCount> chosen = {
+      {{choice.color, StreamId::kColor},
+       {choice.depth, StreamId::kDepth},
+       {choice.imu, StreamId::kImu},
+       {choice.legs, StreamId::kLegs},
+       {choice.odometry, StreamId::kBodyVelocity}}};
+  const auto* const found = std::ranges::find(chosen, topic, &decltype(chosen)::value_type::first);
+  return found == chosen.end() ? std::nullopt : std::optional{found->second};
+}
+
 class BagReader final : public RecordingReader {
  public:
   BagReader(std::unique_ptr<Bag> bag, TopicChoice choice)
@@ -80,7 +97,10 @@ class BagReader final : public RecordingReader {
              .end = at(bag_->end_ns()),
              .streams = {}};
     for (const BagTopic& topic : bag_->topics()) {
-      info_.streams.push_back({.name = topic.name, .type = topic.type, .count = topic.count});
+      info_.streams.push_back({.name = topic.name,
+                               .type = topic.type,
+                               .count = topic.count,
+                               .stream = stream_of_topic(choice_, topic.name)});
     }
     bag_->select([this](std::string_view topic) {
       return !topic.empty() &&

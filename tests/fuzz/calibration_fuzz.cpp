@@ -1,0 +1,31 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+#include "replay/calibration/kalibr.hpp"
+#include "replay/calibration/writer.hpp"
+#include "replay/openloris/calibration.hpp"
+#include "replay/reader.hpp"
+
+namespace kalibr = geoflow::drivers::kalibr;
+namespace openloris = geoflow::drivers::openloris;
+
+/// YAML calibrations from any bytes; what is accepted must survive being written and read again.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const void* bytes = data;
+  const std::string text{static_cast<const char*>(bytes), size};
+  if (const auto chain = kalibr::parse_camchain("chain", text)) {
+    if (!kalibr::parse_camchain("again", kalibr::write_camchain(*chain))) {
+      std::abort();
+    }
+  }
+  if (const auto noise = kalibr::parse_imu("imu", text)) {
+    if (!kalibr::parse_imu("again", kalibr::write_imu(*noise))) {
+      std::abort();
+    }
+  }
+  auto sensors = openloris::parse_sensors("sensors", text);
+  geoflow::drivers::FoundCalibration found;
+  return sensors && openloris::parse_transforms("transforms", text, found) ? 0 : 0;
+}
