@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "geoflow/hal/result.hpp"
+
 #include "replay/euroc/reader.hpp"
 #include "replay/text.hpp"
 
@@ -13,12 +14,14 @@ namespace text = geoflow::drivers::text;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const void* bytes = data;
   const std::string_view content{static_cast<const char*>(bytes), size};
-  const auto done = text::for_each_line("imu.csv", content, [](const text::Line& line) -> geoflow::Result<void> {
-    const auto sample = geoflow::drivers::euroc::parse_line(line.text);
-    if (sample && !(sample->sample.accel_mps2.allFinite() && sample->sample.gyro_radps.allFinite())) {
-      std::abort();
-    }
-    return {};
-  });
+  const auto done =
+      text::for_each_line("imu.csv", content, [](const text::Line& line) -> geoflow::Result<void> {
+        const auto sample = geoflow::drivers::euroc::parse_line(line.text);
+        if (sample &&
+            !(sample->sample.accel_mps2.allFinite() && sample->sample.gyro_radps.allFinite())) {
+          std::abort();
+        }
+        return {};
+      });
   return done ? 0 : 0;
 }

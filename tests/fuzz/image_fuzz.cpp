@@ -3,6 +3,7 @@
 #include <span>
 
 #include "geoflow/hal/image.hpp"
+
 #include "replay/decode.hpp"
 #include "replay/reader.hpp"
 
@@ -18,10 +19,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   for (const auto stream : {drivers::ImageStream::kColor, drivers::ImageStream::kDepth}) {
-    const drivers::EncodedImage image{.stream = stream, .bytes = {bytes.begin(), bytes.end()}, .origin = "fuzz"};
-    const auto frame = drivers::decode(image, {.color_as_gray = size % 2 == 0},
-                                       [](const geoflow::ImageShape& shape) { return pool.acquire(shape); });
-    if (frame && (frame->shape().width != header->width || frame->shape().height != header->height)) {
+    const drivers::EncodedImage image{
+        .stream = stream, .bytes = {bytes.begin(), bytes.end()}, .origin = "fuzz"};
+    const auto frame =
+        drivers::decode(image, {.color_as_gray = size % 2 == 0},
+                        [](const geoflow::ImageShape& shape) { return pool.acquire(shape); });
+    if (frame &&
+        (frame->shape().width != header->width || frame->shape().height != header->height)) {
       __builtin_trap();
     }
   }

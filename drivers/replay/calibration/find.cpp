@@ -92,20 +92,17 @@ std::filesystem::path folder_of(const std::filesystem::path& recording) {
 }
 
 Error none_found(const RecordingOptions& options) {
-  constexpr std::string_view kAdvice =
-      ": no camera calibration. Looked for camchain-imucam.yaml and camchain.yaml in the "
-      "recording's folder, for one that "
-      "the recording carries (camera_info of a bag, sensors.yaml of OpenLORIS-Scene), and for "
-      "freiburg1, freiburg2 or "
-      "freiburg3 in the folder's name. Provide --calibration DIR with a camchain.yaml like this "
-      "one:\n"
-      "cam0:\n"
-      "  camera_model: pinhole\n"
-      "  intrinsics: [525.0, 525.0, 319.5, 239.5]  # fx fy cx cy [px]\n"
-      "  distortion_model: radtan\n"
-      "  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n"
-      "  resolution: [640, 480]\n"
-      "depth_factor: 1000  # counts of a depth pixel per metre";
+  constexpr std::string_view kAdvice = R"(: no camera calibration
+Looked for: camchain-imucam.yaml or camchain.yaml in the recording's folder; camera_info in a bag or
+sensors.yaml of OpenLORIS-Scene; freiburg1, freiburg2 or freiburg3 in the folder's name.
+Provide --calibration DIR with a camchain.yaml like this one:
+cam0:
+  camera_model: pinhole
+  intrinsics: [525.0, 525.0, 319.5, 239.5]  # fx fy cx cy [px]
+  distortion_model: radtan
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
+  resolution: [640, 480]
+depth_factor: 1000  # counts of a depth pixel per metre)";
   return Error{.code = ErrorCode::kNotFound, .message = options.path.string().append(kAdvice)};
 }
 
