@@ -8,6 +8,7 @@
 #include <random>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "geoflow/drivers/faults.hpp"
@@ -114,6 +115,11 @@ class FaultReader final : public RecordingReader {
     for (std::size_t stage = 0; stage < stages_.size(); ++stage) {
       std::vector<Event> rest;
       stages_[stage]->finish(rest);
+      for (Event& event : rest) {  // later samples have been returned already
+        std::visit(
+            [this](auto& sample) { sample.t_arrival = std::max(sample.t_arrival, horizon_); },
+            event);
+      }
       pass(std::move(rest), stage + 1);
     }
   }

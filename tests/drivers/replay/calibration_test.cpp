@@ -33,24 +33,24 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using tests::message_of;
 
-constexpr std::string_view kGood =
-    "cam0:\n"
-    "  cam_overlaps: [1]\n"
-    "  camera_model: pinhole\n"
-    "  intrinsics: [600.5, 601.5, 320.25, 240.75]\n"
-    "  distortion_model: radtan\n"
-    "  distortion_coeffs: [0.1, -0.2, 0.001, -0.002]\n"
-    "  resolution: [640, 480]\n"
-    "  rostopic: /camera/color/image_raw\n"
-    "  T_cam_imu:\n"
-    "  - [0.0, -1.0, 0.0, 0.01]\n"
-    "  - [0.0, 0.0, -1.0, 0.02]\n"
-    "  - [1.0, 0.0, 0.0, 0.03]\n"
-    "  - [0.0, 0.0, 0.0, 1.0]\n"
-    "  timeshift_cam_imu: -0.0035\n"
-    "cam1: {camera_model: omni}\n"
-    "depth_factor: 5000\n"
-    "serial: '0123'\n";
+constexpr std::string_view kGood = R"(cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  intrinsics: [600.5, 601.5, 320.25, 240.75]
+  distortion_model: radtan
+  distortion_coeffs: [0.1, -0.2, 0.001, -0.002]
+  resolution: [640, 480]
+  rostopic: /camera/color/image_raw
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.01]
+  - [0.0, 0.0, -1.0, 0.02]
+  - [1.0, 0.0, 0.0, 0.03]
+  - [0.0, 0.0, 0.0, 1.0]
+  timeshift_cam_imu: -0.0035
+cam1: {camera_model: omni}
+depth_factor: 5000
+serial: '0123'
+)";
 
 TEST(Kalibr, ReadsACameraChain) {
   const auto read = kalibr::parse_camchain("camchain.yaml", std::string{kGood});

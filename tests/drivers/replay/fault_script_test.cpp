@@ -1,11 +1,10 @@
-#include "replay/faults/script.hpp"
+#include <string>
+#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <string>
-#include <string_view>
-
+#include "replay/faults/script.hpp"
 #include "replay/fixtures.hpp"
 
 namespace geoflow::drivers {

@@ -22,7 +22,6 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
-#include "tests/support/data.hpp"
 
 #include "replay/faults/reader.hpp"
 #include "replay/faults/script.hpp"
@@ -32,11 +31,7 @@
 namespace geoflow::drivers {
 namespace {
 
-using geoflow::tests::TemporaryDirectory;
 using std::chrono::milliseconds;
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
 using tests::at_ms;
 using tests::message_of;
 
@@ -184,7 +179,7 @@ TEST(Faults, DelayMovesArrivalAndKeepsTheStamp) {
   for (const ImageArrival& image : faulty.of<ImageArrival>()) {
     const Duration delay = image.t_arrival.time_since_epoch() - image.t_device.time_since_epoch();
     EXPECT_TRUE(delay == Duration{} || (delay >= milliseconds{50} && delay < milliseconds{150}));
-    late += delay > Duration{} ? 1 : 0;
+    late += delay > Duration{} ? 1U : 0U;
   }
   EXPECT_EQ(late, faulty.counters.of(FaultKind::kDelay, StreamId::kDepth));
   EXPECT_NEAR(static_cast<double>(late), 500, 5 * std::sqrt(250.0));
@@ -221,7 +216,8 @@ TEST(Faults, ReorderKeepsTheLastSample) {
 }
 
 TEST(Faults, StuckRepeatsTheLastGoodValueUnderNewStamps) {
-  const Outcome faulty = run("[[fault]]\nkind = 'stuck'\nstream = 'imu'\nfrom_s = 1\nuntil_s = 2\n");
+  const Outcome faulty =
+      run("[[fault]]\nkind = 'stuck'\nstream = 'imu'\nfrom_s = 1\nuntil_s = 2\n");
   EXPECT_EQ(faulty.counters.of(FaultKind::kStuck, StreamId::kImu), 100U);
   const auto imus = faulty.of<ImuArrival>();
   EXPECT_EQ(imus[99].sample.accel_mps2.x(), 99);
@@ -238,13 +234,13 @@ TEST(Faults, NanPoisonsNumbers) {
         run(fmt::format("[[fault]]\nkind = 'nan'\nstream = '{}'\nuntil_s = 0.1\n", stream));
     std::size_t bad = 0;
     for (const auto& imu : faulty.of<ImuArrival>()) {
-      bad += imu.sample.accel_mps2.hasNaN() && imu.sample.gyro_radps.hasNaN() ? 1 : 0;
+      bad += imu.sample.accel_mps2.hasNaN() && imu.sample.gyro_radps.hasNaN() ? 1U : 0U;
     }
     for (const auto& legs : faulty.of<Arrival<LegClock, LegSample>>()) {
-      bad += std::isnan(legs.sample.joints[11].q_rad) ? 1 : 0;
+      bad += std::isnan(legs.sample.joints[11].q_rad) ? 1U : 0U;
     }
     for (const auto& velocity : faulty.of<Arrival<LegClock, BodyVelocitySample>>()) {
-      bad += velocity.sample.v_base_mps.hasNaN() ? 1 : 0;
+      bad += velocity.sample.v_base_mps.hasNaN() ? 1U : 0U;
     }
     EXPECT_EQ(bad, 10U) << stream;
     EXPECT_EQ(faulty.total(), 10U) << stream;
@@ -268,7 +264,8 @@ Duration clock_error(const Outcome& faulty, std::size_t index) {
 }
 
 TEST(Faults, ClockOffsetShiftsStampsButNotArrivals) {
-  const Outcome faulty = run("[[fault]]\nkind = 'clock_offset'\nstream = 'imu'\noffset_s = -0.25\n");
+  const Outcome faulty =
+      run("[[fault]]\nkind = 'clock_offset'\nstream = 'imu'\noffset_s = -0.25\n");
   EXPECT_EQ(clock_error(faulty, 0), milliseconds{-250});
   EXPECT_EQ(clock_error(faulty, 999), milliseconds{-250});
   EXPECT_EQ(faulty.counters.of(FaultKind::kClockOffset, StreamId::kImu),
@@ -298,7 +295,8 @@ TEST(Faults, ClockJumpStepsOnceAndStays) {
 }
 
 TEST(Faults, ClockWrapIsA32BitCounterOfMicroseconds) {
-  const Outcome faulty = run("[[fault]]\nkind = 'clock_wrap'\nstream = 'camera'\nfirst_wrap_s = 3\n");
+  const Outcome faulty =
+      run("[[fault]]\nkind = 'clock_wrap'\nstream = 'camera'\nfirst_wrap_s = 3\n");
   constexpr Duration kPeriod = std::chrono::microseconds{std::int64_t{1} << 32U};
   EXPECT_EQ(faulty.stamps.camera.domain, StampDomain::kDevice);
   EXPECT_EQ(faulty.stamps.camera.wrap, kPeriod);
@@ -347,58 +345,6 @@ TEST(Faults, AreDeterministicBySeed) {
   EXPECT_EQ(trace(run(kMixed, 7)), trace(run(kMixed, 7)));
   EXPECT_NE(trace(run(kMixed, 7)), trace(run(kMixed, 8)));
   EXPECT_NE(trace(run(kMixed, 7)), trace(run(kMixed, 7 + (std::uint64_t{1} << 32U))));
-}
-
-TEST(Faults, AreCountedInAReplay) {
-  const TemporaryDirectory directory;
-  tests::write_tum(directory.path(), 10);
-  const auto script = directory.path() / "faults.toml";
-  tests::write_text(script,
-                    "[[fault]]\nkind = 'truncate'\nstream = 'color'\nuntil_s = 0.03\n"
-                    "[[fault]]\nkind = 'drop'\nstream = 'depth'\nfrom_s = 0.3\n"
-                    "[[fault]]\nkind = 'clock_wrap'\nstream = 'camera'\nfirst_wrap_s = 0.1\n");
-  auto streams = RecordedStreams::open({.path = directory.path(), .faults = script});
-  ASSERT_TRUE(streams) << streams.error().message;
-  tests::Recorder recorder;
-  ASSERT_TRUE((*streams)->camera().start(recorder));
-  EXPECT_EQ((*streams)->camera().stamps().domain, StampDomain::kDevice);
-  EXPECT_THAT(tests::drain(**streams),
-              ElementsAre(AllOf(HasSubstr("rgb.txt:3"), HasSubstr("cut off"))));
-  const FaultCounters counters = (*streams)->faults();
-  EXPECT_EQ(counters.of(FaultKind::kTruncate, StreamId::kColor), 1U);
-  EXPECT_EQ(counters.of(FaultKind::kDrop, StreamId::kDepth), 1U);
-  EXPECT_EQ(counters.of(FaultKind::kClockWrap, StreamId::kColor) +
-                counters.of(FaultKind::kClockWrap, StreamId::kDepth),
-            1U);
-  EXPECT_EQ(recorder.colors.size(), 9U);
-  EXPECT_EQ(recorder.depths.size(), 9U);
-  EXPECT_THAT(message_of(RecordedStreams::open(
-                  {.path = directory.path(), .faults = directory.path() / "none.toml"})),
-              HasSubstr("none.toml"));
-}
-
-TEST(Faults, KitchenWithEveryFaultReachesItsEnd) {
-  GEOFLOW_DATA_OR_SKIP(path, "kitchen-400");
-  const TemporaryDirectory directory;
-  const auto script = directory.path() / "faults.toml";
-  tests::write_text(
-      script, fmt::format("{}{}", kMixed,
-                          "[[fault]]\nkind = 'duplicate'\nstream = 'camera'\nprobability = 0.05\n"
-                          "[[fault]]\nkind = 'truncate'\nstream = 'camera'\nprobability = 0.05\n"
-                          "[[fault]]\nkind = 'gap'\nstream = 'camera'\nfrom_s = 5\nuntil_s = 6\n"
-                          "[[fault]]\nkind = 'clock_wrap'\nstream = 'camera'\nfirst_wrap_s = 4\n"));
-  auto streams = RecordedStreams::open(
-      {.path = path, .faults = script, .fault_seed = 3, .color_as_gray = true});
-  ASSERT_TRUE(streams) << streams.error().message;
-  const auto errors = tests::drain(**streams);
-  const FaultCounters counters = (*streams)->faults();
-  const auto truncated = counters.of(FaultKind::kTruncate, StreamId::kColor) +
-                         counters.of(FaultKind::kTruncate, StreamId::kDepth);
-  EXPECT_GT(truncated, 10U);
-  EXPECT_EQ(errors.size(), truncated);
-  EXPECT_EQ(counters.of(FaultKind::kClockWrap, StreamId::kColor) +
-                counters.of(FaultKind::kClockWrap, StreamId::kDepth),
-            1U);
 }
 
 }  // namespace
