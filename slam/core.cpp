@@ -93,7 +93,9 @@ class Core::Impl {
   PoseEstimate follow(const SyncedPacket& packet) {
     const TrackingResult result = tracker_.track(map_, motion_);
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
-    const bool fixed = result.visual_fix || result.depth_fix;
+    // Depth alone carries a track on but begins none: what looks alike in depth may be elsewhere.
+    const bool fixed =
+        result.visual_fix || (result.depth_fix && last_.status == TrackingStatus::kTracking);
     motion_.update(packet.t, T_odom_cam, fixed);
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);

@@ -14,8 +14,8 @@
 
 namespace geoflow::slam {
 
-std::optional<SE3> solve_pnp(std::span<const VisualMatch> matches, const CameraModel& camera,
-                             const PoseConfig& config) {
+std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
+                                     const CameraModel& camera, const PoseConfig& config) {
   constexpr int kIterations = 100;
   constexpr double kConfidence = 0.99;
   constexpr double kLeastInlierShare = 0.5;
@@ -46,7 +46,7 @@ std::optional<SE3> solve_pnp(std::span<const VisualMatch> matches, const CameraM
   if (!T_cam_odom.matrix().allFinite()) {
     return std::nullopt;
   }
-  return T_cam_odom.inverse();
+  return PnpSolution{T_cam_odom.inverse(), inliers.size()};
 }
 
 }  // namespace geoflow::slam

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 
@@ -11,10 +12,16 @@
 
 namespace geoflow::slam {
 
+struct PnpSolution {
+  SE3 T_odom_cam;
+  std::size_t inliers = 0;
+};
+
 /// Pose by PnP with RANSAC over map points (paper, section IV-B): P3P hypotheses, refined on their
 /// inliers. None when fewer than PoseConfig::minimum_visual_inliers or less than half of the
 /// matches agree. Deterministic.
-[[nodiscard]] std::optional<SE3> solve_pnp(std::span<const VisualMatch> matches,
-                                           const CameraModel& camera, const PoseConfig& config);
+[[nodiscard]] std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
+                                                   const CameraModel& camera,
+                                                   const PoseConfig& config);
 
 }  // namespace geoflow::slam

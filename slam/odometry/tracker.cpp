@@ -17,8 +17,10 @@
 namespace geoflow::slam {
 namespace {
 
-constexpr double kTargetOverlap =
-    0.5;  ///< a frame is registered to keyframes that see at least this much of it
+constexpr std::size_t kRelocationKeyframes =
+    30;  ///< newest keyframes that a lost frame is compared with
+/// A frame is registered to keyframes that see at least this share of its depth.
+constexpr double kTargetOverlap = 0.5;
 
 }  // namespace
 
@@ -109,29 +111,38 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
   }
 }
 
-void Tracker::find_again(const Map& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<PointId> points;
-  std::vector<ExpectedFeature> expected;
-  const Vector2d middle{camera_.intrinsics().cx, camera_.intrinsics().cy};
-  for (const KeyframeId id : keyframes) {
-    for (const PointId point : map.keyframe(id).points) {
-      if (std::find(points.begin(), points.end(), point) == points.end()) {
-        points.push_back(point);
-        expected.push_back({middle, map.find_point(point)->descriptor});
-      }
-    }
-  }
+std::optional<SE3> Tracker::relocate(const Map& map) {
   const std::vector<OrbFeature> found = orb_.extract(current_.pyramid.image(), {});
   const double anywhere = camera_.intrinsics().width + camera_.intrinsics().height;
-  const std::vector<int> match = match_by_projection(expected, found, anywhere);
-  current_.features.clear();
-  for (std::size_t i = 0; i < match.size(); ++i) {
-    if (match[i] >= 0) {
-      Feature feature = feature_at(found[static_cast<std::size_t>(match[i])].pixel);
-      feature.point = points[i];
-      current_.features.push_back(feature);
+  const Vector2d middle{camera_.intrinsics().cx, camera_.intrinsics().cy};
+  std::optional<SE3> best;
+  std::size_t most = 0;
+  std::size_t tried = 0;
+  for (auto keyframe = map.keyframes().rbegin();
+       keyframe != map.keyframes().rend() && tried < kRelocationKeyframes; ++keyframe, ++tried) {
+    std::vector<ExpectedFeature> expected;
+    for (const PointId id : keyframe->second.points) {
+      expected.push_back({middle, map.find_point(id)->descriptor});
+    }
+    const std::vector<int> match = match_by_projection(expected, found, anywhere);
+    std::vector<Feature> features;
+    std::vector<VisualMatch> matches;
+    for (std::size_t i = 0; i < match.size(); ++i) {
+      if (match[i] >= 0) {
+        Feature feature = feature_at(found[static_cast<std::size_t>(match[i])].pixel);
+        feature.point = keyframe->second.points[i];
+        features.push_back(feature);
+        matches.push_back({map.find_point(*feature.point)->p_odom, feature.ideal, feature.depth_m});
+      }
+    }
+    const std::optional<PnpSolution> solution = solve_pnp(matches, camera_, config_.pose);
+    if (solution && solution->inliers > most) {
+      most = solution->inliers;
+      best = solution->T_odom_cam;
+      current_.features = std::move(features);
     }
   }
+  return best;
 }
 
 std::vector<VisualMatch> Tracker::matches(const Map& map,
@@ -151,9 +162,9 @@ std::vector<VisualMatch> Tracker::matches(const Map& map,
 SE3 Tracker::initial_pose(const Map& map, const SE3& predicted,
                           std::span<const VisualMatch> matches, PoseSource& source) {
   const StageScope scope{observer_, Stage::kPoseInitialisation};
-  if (const std::optional<SE3> pose = solve_pnp(matches, camera_, config_.pose)) {
+  if (const std::optional<PnpSolution> pose = solve_pnp(matches, camera_, config_.pose)) {
     source = PoseSource::kPnp;
-    return *pose;
+    return pose->T_odom_cam;
   }
   if (config_.switches.gicp && current_.cloud && previous_.cloud && !map.keyframes().empty()) {
     const RegistrationResult registration = register_clouds(
@@ -201,6 +212,15 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   std::vector<VisualMatch> visual = matches(map, feature_of_match);
   SE3 start = initial_pose(map, prior.T_odom_cam, visual, result.source);
 
+  if (result.source != PoseSource::kPnp) {
+    if (const std::optional<SE3> pose = relocate(map)) {
+      result.source = PoseSource::kPnp;
+      start = *pose;
+      feature_of_match.clear();
+      visual = matches(map, feature_of_match);
+    }
+  }
+
   const StageScope scope{observer_, Stage::kPoseOptimisation};
   std::vector<KeyframeId> targets;
   if (current_.cloud) {
@@ -208,15 +228,6 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
     result.overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
     targets =
         registration_targets(overlapping, static_cast<std::size_t>(config_.pose.gicp_targets));
-  }
-  if (result.source != PoseSource::kPnp) {
-    find_again(map, targets);
-    feature_of_match.clear();
-    visual = matches(map, feature_of_match);
-    if (const std::optional<SE3> pose = solve_pnp(visual, camera_, config_.pose)) {
-      result.source = PoseSource::kPnp;
-      start = *pose;
-    }
   }
   std::vector<DepthTarget> depth_targets;
   if (config_.switches.gicp) {

@@ -48,7 +48,9 @@ class Tracker {
  private:
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
-  void find_again(const Map& map, const std::vector<KeyframeId>& keyframes);
+  /// Looks for the current frame in the newest keyframes by descriptors alone: needs no prediction.
+  /// On success the frame's features are the matches.
+  [[nodiscard]] std::optional<SE3> relocate(const Map& map);
   [[nodiscard]] std::vector<VisualMatch> matches(const Map& map,
                                                  std::vector<std::size_t>& feature_of_match) const;
   [[nodiscard]] SE3 initial_pose(const Map& map, const SE3& predicted,
