@@ -155,16 +155,19 @@ bool ClockFit::jumped(const StampPair& pair, double residual_ns) noexcept {
   return jump_.add(pair.device_ns, residual_ns, gate, config_.jump_samples, span.count());
 }
 
-/// An outlier's place. Late: where the line says, with its whole lateness as bound. Otherwise the
-/// stamp contradicts the arrival: a usual delay before that.
+/// An outlier's place. Late: where the line says; later than is believable, or early: a usual delay before its arrival.
+/// A late sample's bound is all of its lateness, so that it covers both: a slow transport, and a clock that jumped.
 Placed ClockFit::place_doubtful(const StampPair& pair, double residual_ns) const noexcept {
+  const double lateness = std::clamp(residual_ns, 0.0, static_cast<double>(kFarNs));
+  Placed placed;
   if (residual_ns > 0.0 && residual_ns <= to_ns(config_.max_delay)) {
-    Placed placed = place(pair.device_ns);
-    placed.error_bound_ns = std::max(placed.error_bound_ns, round_ns(residual_ns));
-    return placed;
+    placed = place(pair.device_ns);
+  } else {
+    const std::int64_t usual_delay = round_ns(spread_.median_ns());
+    placed = {pair.arrival_ns - usual_delay, std::max(config_.first_bound.count(), usual_delay), true};
   }
-  const std::int64_t usual_delay = round_ns(spread_.median_ns());
-  return {pair.arrival_ns - usual_delay, std::max(config_.first_bound.count(), usual_delay), true};
+  placed.error_bound_ns = std::max(placed.error_bound_ns, round_ns(lateness));
+  return placed;
 }
 
 double ClockFit::residual_ns(const StampPair& pair) const noexcept {
