@@ -99,7 +99,8 @@ void assert_window(const std::vector<Timed<Sample>>& window, std::optional<HostT
   std::size_t before = 0;
   std::size_t beyond = 0;
   for (std::size_t i = 0; i < window.size(); ++i) {
-    RC_ASSERT(i == 0 || window[i - 1].t < window[i].t);
+    const bool in_order = i == 0 || window[i - 1].t < window[i].t;
+    RC_ASSERT(in_order);
     before += after && window[i].t <= *after ? 1U : 0U;
     beyond += window[i].t > until ? 1U : 0U;
     seen.insert(window[i].t.time_since_epoch().count());
@@ -122,10 +123,11 @@ void assert_laws(Script& script) {
   for (std::size_t i = 0; i < script.packets.size(); ++i) {
     const SyncedPacket& packet = script.packets[i];
     RC_ASSERT(packet.sequence == i);
-    RC_ASSERT(!last || packet.t > *last);
+    const bool later =
+        !last || packet.t > *last;  // outside RC_ASSERT, which does not short-circuit
+    RC_ASSERT(later);
     RC_ASSERT(static_cast<bool>(packet.color));
-    RC_ASSERT(!packet.depth ||
-              std::chrono::abs(packet.depth_offset) <= SynchroniserConfig{}.depth_tolerance);
+    RC_ASSERT(std::chrono::abs(packet.depth_offset) <= SynchroniserConfig{}.depth_tolerance);
     if (packet.depth) {
       depths.insert(packet.depth.bytes().data());
     }
