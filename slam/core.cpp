@@ -53,17 +53,17 @@ class Core::Impl {
   }
 
   void apply(const MappingResult& result) {
-    const SE3 T_new_old = builder_.apply(map_, *result.solution);
-    tracker_.current().T_odom_cam = T_new_old * tracker_.current().T_odom_cam;
-    motion_.move(T_new_old);
+    const SE3 T_odom1_odom0 = builder_.apply(map_, *result.solution);
+    tracker_.current().T_odom_cam = T_odom1_odom0 * tracker_.current().T_odom_cam;
+    motion_.move(T_odom1_odom0);
   }
 
   Trajectory final_trajectory() const {
     Trajectory trajectory;
     const SE3 T_cam_base = T_base_cam_.inverse();
     for (const FrameRecord& record : records_) {
-      trajectory.push_back({record.t, map_.keyframe(record.reference).T_odom_cam *
-                                          record.T_reference_cam * T_cam_base});
+      const SE3& T_odom_reference = map_.keyframe(record.reference).T_odom_cam;
+      trajectory.push_back({record.t, T_odom_reference * record.T_reference_cam * T_cam_base});
     }
     return trajectory;
   }
@@ -79,7 +79,7 @@ class Core::Impl {
 
   PoseEstimate start(const SyncedPacket& packet) {
     Frame& frame = tracker_.current();
-    frame.T_odom_cam = T_base_cam_;  // odom is the base frame of the first packet
+    frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
     motion_.update(packet.t, frame.T_odom_cam, false);
     insert_keyframe(Matrix6d::Zero());
     records_.push_back({packet.t, reference_, SE3{}});

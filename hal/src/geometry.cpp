@@ -5,10 +5,12 @@
 namespace geoflow {
 namespace {
 
-/// Below this angle [rad] the closed forms lose digits and their Taylor series are exact to rounding.
+/// Below this angle [rad] the closed forms lose digits and their Taylor series are exact to
+/// rounding.
 constexpr double kSmallAngle = 1e-4;
 
-/// The mixed block of SE(3)'s left Jacobian. Source: Barfoot, "State Estimation for Robotics", 2017, eq. (7.86).
+/// The mixed block of SE(3)'s left Jacobian. Source: Barfoot, "State Estimation for Robotics",
+/// 2017, eq. (7.86).
 Matrix3d left_jacobian_mixed_block(const Vector3d& phi, const Vector3d& rho) noexcept {
   const double angle = phi.norm();
   const double angle2 = angle * angle;
@@ -41,7 +43,8 @@ namespace so3 {
 
 Eigen::Quaterniond exp(const Vector3d& phi) noexcept {
   const double angle = phi.norm();
-  const double half_sinc = angle < kSmallAngle ? 0.5 - angle * angle / 48 : std::sin(angle / 2) / angle;
+  const double half_sinc =
+      angle < kSmallAngle ? 0.5 - angle * angle / 48 : std::sin(angle / 2) / angle;
   const Vector3d v = half_sinc * phi;
   return Eigen::Quaterniond{std::cos(angle / 2), v.x(), v.y(), v.z()};
 }

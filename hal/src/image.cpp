@@ -6,7 +6,8 @@
 
 namespace geoflow {
 
-FramePool::FramePool(std::size_t capacity) : slots_{std::make_shared<std::vector<FrameRef::Slot>>(capacity)} {}
+FramePool::FramePool(std::size_t capacity)
+    : slots_{std::make_shared<std::vector<FrameRef::Slot>>(capacity)} {}
 
 FrameRef FramePool::acquire(const ImageShape& shape) {
   for (FrameRef::Slot& slot : *slots_) {
@@ -18,8 +19,10 @@ FrameRef FramePool::acquire(const ImageShape& shape) {
       slot.memory.resize(shape.size_bytes());
     }
     // The deleter shares ownership of all slots, so a frame outlives its pool.
-    return FrameRef{std::shared_ptr<FrameRef::Slot>{
-        &slot, [slots = slots_](FrameRef::Slot* used) { used->in_use.store(false, std::memory_order_release); }}};
+    return FrameRef{std::shared_ptr<FrameRef::Slot>{&slot, [slots = slots_](FrameRef::Slot* used) {
+                                                      used->in_use.store(false,
+                                                                         std::memory_order_release);
+                                                    }}};
   }
   return {};
 }

@@ -29,10 +29,12 @@ Sink& custom_sink() {
 void write_stderr(Level level, std::string_view category, std::string_view message) {
   constexpr std::array<int, 4> kSyslogPriority = {3, 4, 6, 7};
   constexpr std::array<std::string_view, 4> kName = {"error", "warning", "info", "debug"};
-  static const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe): never set here
+  static const bool journal =
+      std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe): never set here
   const auto index = static_cast<std::size_t>(level);
-  const std::string line = journal ? fmt::format("<{}>{}: {}\n", kSyslogPriority.at(index), category, message)
-                                   : fmt::format("{} {}: {}\n", kName.at(index), category, message);
+  const std::string line =
+      journal ? fmt::format("<{}>{}: {}\n", kSyslogPriority.at(index), category, message)
+              : fmt::format("{} {}: {}\n", kName.at(index), category, message);
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -43,9 +45,13 @@ void set_sink(Sink sink) {
   custom_sink() = std::move(sink);
 }
 
-void set_level(Level level) noexcept { maximum_level = level; }
+void set_level(Level level) noexcept {
+  maximum_level = level;
+}
 
-bool enabled(Level level) noexcept { return level <= maximum_level.load(std::memory_order_relaxed); }
+bool enabled(Level level) noexcept {
+  return level <= maximum_level.load(std::memory_order_relaxed);
+}
 
 void write(Level level, std::string_view category, std::string_view message) {
   const std::lock_guard lock{sink_mutex()};

@@ -1,8 +1,8 @@
 #include "geoflow/hal/unique_fd.hpp"
 
-#include <unistd.h>
-
 #include <utility>
+
+#include <unistd.h>
 
 namespace geoflow {
 

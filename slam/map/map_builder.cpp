@@ -262,12 +262,12 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
 }
 
 SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
-  SE3 T_new_old;
+  SE3 T_odom1_odom0;
   if (!solution.T_odom_cam.empty()) {
     const auto& [newest, pose] = *solution.T_odom_cam.rbegin();
-    T_new_old = pose * map.keyframe(newest).T_odom_cam.inverse();
+    T_odom1_odom0 = pose * map.keyframe(newest).T_odom_cam.inverse();
     for (auto it = map.keyframes().upper_bound(newest); it != map.keyframes().end(); ++it) {
-      map.keyframe(it->first).T_odom_cam = T_new_old * it->second.T_odom_cam;
+      map.keyframe(it->first).T_odom_cam = T_odom1_odom0 * it->second.T_odom_cam;
     }
   }
   for (const auto& [id, pose] : solution.T_odom_cam) {
@@ -284,7 +284,7 @@ SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
   for (const DepthEdge& edge : solution.measured) {
     map.add_edge(edge);
   }
-  return T_new_old;
+  return T_odom1_odom0;
 }
 
 }  // namespace geoflow::slam

@@ -33,8 +33,8 @@ class MapBuilder {
   [[nodiscard]] MappingTask task(const Map& map, KeyframeId newest) const;
 
   /// Takes a solution over into the map. Keyframes younger than the solution's newest move along
-  /// with it. Returns the motion of that newest keyframe: T_new_old, to be applied on the left to
-  /// whatever depends on it.
+  /// with it. Returns the motion of that newest keyframe: T_odom1_odom0, to be applied on the left
+  /// to whatever depends on it.
   [[nodiscard]] SE3 apply(Map& map, const MappingSolution& solution) const;
 
  private:

@@ -47,8 +47,8 @@ PosePrior MotionModel::predict(HostTime t) const {
   return {T_odom_cam_ * motion_over(t - t_), sigma.cwiseInverse().cwiseAbs2().asDiagonal()};
 }
 
-void MotionModel::move(const SE3& T_new_old) {
-  T_odom_cam_ = T_new_old * T_odom_cam_;
+void MotionModel::move(const SE3& T_odom1_odom0) {
+  T_odom_cam_ = T_odom1_odom0 * T_odom_cam_;
 }
 
 }  // namespace geoflow::slam

@@ -25,7 +25,7 @@ class MotionModel {
   [[nodiscard]] SE3 motion_over(Duration duration) const;
 
   /// Moves the last pose with the map: left-multiplies it.
-  void move(const SE3& T_new_old);
+  void move(const SE3& T_odom1_odom0);
 
   /// Velocity of the camera in its own frame (rotation, translation) [rad/s, m/s].
   [[nodiscard]] const Vector6d& velocity() const noexcept { return velocity_; }

@@ -11,8 +11,8 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "map/overlap.hpp"
-#include "odometry/pose_initialiser.hpp"
 #include "vision/image_pyramid.hpp"
+#include "vision/pnp.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -171,7 +171,8 @@ SE3 Tracker::initial_pose(const Map& map, const SE3& predicted,
         *current_.cloud, *previous_.cloud, previous_.T_odom_cam.inverse() * predicted, gicp_);
     if (registration.converged) {
       source = PoseSource::kGicp;
-      return previous_.T_odom_cam * registration.T_target_source;
+      const SE3& T_odom_target = previous_.T_odom_cam;
+      return T_odom_target * registration.T_target_source;
     }
   }
   source = PoseSource::kConstantVelocity;

@@ -9,10 +9,13 @@
 #include <span>
 #include <vector>
 
-/// Runs a fuzz target without libFuzzer: over nothing, over each seed, over each seed cut short, and over seeds with
-/// some bytes changed. It passes by not crashing. Usage: NAME_fuzz [SEEDS_FOLDER]
+/// Runs a fuzz target without libFuzzer: over nothing, over each seed, over each seed cut short,
+/// and over seeds with some bytes changed. It passes by not crashing. Usage: NAME_fuzz
+/// [SEEDS_FOLDER]
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);  // NOLINT(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(
+    const std::uint8_t* data,
+    std::size_t size);  // NOLINT(readability-identifier-naming): libFuzzer's name
 
 namespace {
 
@@ -23,7 +26,9 @@ constexpr int kMutations = 200;
 constexpr std::size_t kRandomBytes = 512;
 constexpr unsigned kByteValues = 256;
 
-void run(std::span<const std::uint8_t> input) { LLVMFuzzerTestOneInput(input.data(), input.size()); }
+void run(std::span<const std::uint8_t> input) {
+  LLVMFuzzerTestOneInput(input.data(), input.size());
+}
 
 void run_mutations(const Bytes& seed, std::mt19937& random) {
   if (seed.empty()) {

@@ -1,10 +1,10 @@
 #include "geoflow/hal/geometry.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "tests/support/data.hpp"
 
@@ -15,8 +15,10 @@ namespace {
 std::vector<Vector6d> tangents() {
   constexpr double kPi = 3.14159265358979323846;
   std::vector<Vector6d> all;
-  for (const double angle : {0.0, 1e-12, 1e-7, 9e-5, 1.1e-4, 1e-3, 9e-3, 1.1e-2, 0.5, 2.0, kPi - 1e-6}) {
-    for (const Vector3d& axis : {Vector3d{1, 0, 0}, Vector3d{0, -1, 0}, Vector3d{1, 2, -3}.normalized().eval()}) {
+  for (const double angle :
+       {0.0, 1e-12, 1e-7, 9e-5, 1.1e-4, 1e-3, 9e-3, 1.1e-2, 0.5, 2.0, kPi - 1e-6}) {
+    for (const Vector3d& axis :
+         {Vector3d{1, 0, 0}, Vector3d{0, -1, 0}, Vector3d{1, 2, -3}.normalized().eval()}) {
       for (const Vector3d& rho : {Vector3d{0, 0, 0}, Vector3d{1, -2, 0.5}, Vector3d{1e-6, 0, 0}}) {
         Vector6d xi;
         xi << angle * axis, rho;
@@ -36,7 +38,9 @@ std::vector<Vector6d> tangents() {
   return all;
 }
 
-double distance(const SE3& a, const SE3& b) { return (a.matrix() - b.matrix()).norm(); }
+double distance(const SE3& a, const SE3& b) {
+  return (a.matrix() - b.matrix()).norm();
+}
 
 TEST(SE3, LogInvertsExp) {
   for (const Vector6d& xi : tangents()) {
@@ -75,9 +79,11 @@ TEST(SE3, RightJacobianMatchesDifferences) {
       const Vector6d step = kStep * Vector6d::Unit(k);
       const Vector6d forward = (SE3::exp(xi).inverse() * SE3::exp(xi + step)).log();
       const Vector6d backward = (SE3::exp(xi).inverse() * SE3::exp(xi - step)).log();
-      EXPECT_LT(((forward - backward) / (2 * kStep) - J.col(k)).norm(), 1e-6) << xi.transpose() << " column " << k;
+      EXPECT_LT(((forward - backward) / (2 * kStep) - J.col(k)).norm(), 1e-6)
+          << xi.transpose() << " column " << k;
     }
-    EXPECT_LT((J * SE3::right_jacobian_inverse(xi) - Matrix6d::Identity()).norm(), 1e-9) << xi.transpose();
+    EXPECT_LT((J * SE3::right_jacobian_inverse(xi) - Matrix6d::Identity()).norm(), 1e-9)
+        << xi.transpose();
   }
 }
 

@@ -1,9 +1,9 @@
 #include "geoflow/hal/image.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cstddef>
 #include <optional>
+
+#include <gtest/gtest.h>
 
 namespace geoflow {
 namespace {

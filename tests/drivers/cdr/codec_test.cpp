@@ -73,7 +73,8 @@ class FastCdrOracle {
 
  private:
   static constexpr std::size_t kRoomBytes = std::size_t{1} << 20;
-  std::vector<char> memory_ = std::vector<char>(kRoomBytes);  // zeroed: Fast-CDR leaves padding as it finds it
+  std::vector<char> memory_ =
+      std::vector<char>(kRoomBytes);  // zeroed: Fast-CDR leaves padding as it finds it
   FastBuffer buffer_{memory_.data(), memory_.size()};
   Cdr cdr_;
 };

@@ -1,4 +1,4 @@
-#include "odometry/pose_initialiser.hpp"
+#include "vision/pnp.hpp"
 
 #include <cstddef>
 #include <optional>
