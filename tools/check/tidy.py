@@ -83,9 +83,11 @@ def main():
     if arguments.files:
         wanted = {Path(name).resolve() for name in arguments.files}
     with ThreadPoolExecutor(arguments.jobs) as pool:
-        complaints = [found for found in pool.map(lambda entry: tidy(entry, wanted), sources) if found]
-    for _, output in complaints:
-        print(output)
+        complaints = []
+        for found in pool.map(lambda entry: tidy(entry, wanted), sources):
+            if found:
+                complaints.append(found)
+                print(found[1], flush=True)
     for file, _ in complaints:
         print(f"failed: {file}")
     print(f"tidy: {len(sources)} sources, {len(complaints)} with findings")
