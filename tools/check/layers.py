@@ -48,7 +48,8 @@ def check_own_include(project, path, number, name):
         if part != "tests":
             yield source.Finding(path, number, f"{part} may not include tests")
     elif part != "tests":
-        found = [os.path.normpath(os.path.join(folder, name)) for folder in (part, os.path.dirname(path))]
+        folders = path.split("/")[:-1]
+        found = [os.path.normpath("/".join([*folders[:depth], name])) for depth in range(1, len(folders) + 1)]
         if any(file in project.files and part_of(file) == part for file in found):
             return
         yield source.Finding(path, number, f'"{name}" is no private header of {part}; others are its private matter')
