@@ -42,7 +42,7 @@ LIBRARIES = (
     Library("zstd", r"zstd\.h", ("PkgConfig::ZSTD",), ("drivers/replay",)),
     Library("yaml-cpp", r"yaml-cpp/", ("yaml-cpp",), ("drivers/replay",)),
     Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay")),
-    Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/main.cpp", "tools")),
+    Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/src/command_line.cpp", "tools")),
     Library("nlohmann-json", r"nlohmann/", ("nlohmann_json::nlohmann_json",), ("daemon", "tools")),
     Library("cairo", r"cairo", ("PkgConfig::CAIRO",), ("tools/plot",)),
     Library("systemd", r"systemd/", ("PkgConfig::SYSTEMD",), ("daemon",)),
@@ -78,4 +78,8 @@ THREAD_FILES = (
     "drivers/replay/prefetcher.cpp",  # decodes images ahead of the replay
     "drivers/replay/prefetcher.hpp",
     "drivers/replay/recorded_streams.cpp",  # paced replay waits for the next stamp, interruptibly
+    "daemon/pipeline/pipeline.cpp",  # makes the live pipeline's threads
+    "daemon/src/signal_watch.cpp",  # blocks signals for all threads
+    "daemon/src/worker.cpp",  # makes the thread of a lock-step run
+    "daemon/src/worker.hpp",
 )
