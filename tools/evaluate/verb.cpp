@@ -222,7 +222,7 @@ Result<ExitCode> EvaluateVerb::run(Console& console) {
 
 }  // namespace
 
-std::unique_ptr<Verb> make_evaluate_verb();
+// NOLINTNEXTLINE(misc-use-internal-linkage): called by the generated list of verbs
 std::unique_ptr<Verb> make_evaluate_verb() {
   return std::make_unique<EvaluateVerb>();
 }

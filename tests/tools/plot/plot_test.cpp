@@ -13,7 +13,7 @@
 #include "geoflow/hal/result.hpp"
 #include "tests/support/data.hpp"
 
-#include "src/scale.hpp"
+#include "plot/src/scale.hpp"
 
 namespace geoflow::tools {
 namespace {

@@ -1,13 +1,13 @@
-#include "src/axes.hpp"
+#include "plot/src/axes.hpp"
 
 #include <algorithm>
 #include <cstddef>
 
 #include "geoflow/tools/plot.hpp"
 
-#include "src/canvas.hpp"
-#include "src/colors.hpp"
-#include "src/scale.hpp"
+#include "plot/src/canvas.hpp"
+#include "plot/src/colors.hpp"
+#include "plot/src/scale.hpp"
 
 namespace geoflow::tools {
 namespace {

@@ -2,8 +2,8 @@
 
 #include "geoflow/tools/plot.hpp"
 
-#include "src/canvas.hpp"
-#include "src/scale.hpp"
+#include "plot/src/canvas.hpp"
+#include "plot/src/scale.hpp"
 
 namespace geoflow::tools {
 

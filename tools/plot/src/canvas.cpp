@@ -1,4 +1,4 @@
-#include "src/canvas.hpp"
+#include "plot/src/canvas.hpp"
 
 #include <array>
 #include <filesystem>

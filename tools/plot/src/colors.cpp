@@ -1,4 +1,4 @@
-#include "src/colors.hpp"
+#include "plot/src/colors.hpp"
 
 #include <algorithm>
 #include <array>

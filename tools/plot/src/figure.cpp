@@ -6,8 +6,8 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/plot.hpp"
 
-#include "src/axes.hpp"
-#include "src/canvas.hpp"
+#include "plot/src/axes.hpp"
+#include "plot/src/canvas.hpp"
 
 namespace geoflow::tools {
 namespace {

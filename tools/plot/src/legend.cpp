@@ -5,9 +5,9 @@
 
 #include "geoflow/tools/plot.hpp"
 
-#include "src/axes.hpp"
-#include "src/canvas.hpp"
-#include "src/colors.hpp"
+#include "plot/src/axes.hpp"
+#include "plot/src/canvas.hpp"
+#include "plot/src/colors.hpp"
 
 namespace geoflow::tools {
 namespace {

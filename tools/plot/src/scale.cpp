@@ -1,4 +1,4 @@
-#include "src/scale.hpp"
+#include "plot/src/scale.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,28 @@
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "geoflow/tools/evaluate/evaluation.hpp"
+#include "geoflow/tools/trajectory_file.hpp"
+
+/// Any bytes as a trajectory file in every form, and what was read evaluated against itself and
+/// aligned by scale.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace geoflow::tools;
+  const std::string_view text{
+      reinterpret_cast<const char*>(data),
+      size};  // NOLINT(cppcoreguidelines-pro-type-reinterpret-cast): bytes as text
+  for (const auto format :
+       {std::optional<TrajectoryFormat>{}, std::optional{TrajectoryFormat::kTum},
+        std::optional{TrajectoryFormat::kKitti}, std::optional{TrajectoryFormat::kEuroc}}) {
+    const auto file = parse_trajectory(text, "input", format);
+    if (!file) {
+      continue;
+    }
+    for (const Alignment alignment : {Alignment::kOrigin, Alignment::kSim3}) {
+      static_cast<void>(evaluate(*file, *file, {.alignment = alignment}));
+    }
+  }
+  return 0;
+}
