@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -10,7 +11,100 @@ namespace {
 
 /// What is summed over the rows of a cell, for each image column. q: inverse depth less the
 /// column's reference; v: row less the cell's middle row; only pixels with depth count.
-enum Column : std::size_t { kReference, kCount, kV, kVV, kQ, kQV, kQQ, kColumnSums };
+enum Column : std::size_t { kReference, kCount, kV, kVV, kQ, kQV, kQQ, kMask, kRowQ, kColumnSums };
+
+/// A neighbour belongs to a cell's surface when it is within this many sigmas of a pixel from the
+/// cell's own plane, whose slope is uncertain; the joint fit decides.
+constexpr float kNeighbourSigmas = 4.0F;
+/// Cells, the middle one included, that a joint plane takes.
+constexpr float kMinNeighbourhood = 5.0F;
+/// Least determinant of the cells' scatter, relative to its diagonal: they must not lie on one
+/// line.
+constexpr float kMinSpread = 0.05F;
+
+/// Depth that is used [counts], and counts of 1 / (1 m).
+struct DepthLimits {
+  std::int32_t min;
+  std::int32_t max;
+  float per_inverse_metre;
+};
+
+constexpr int kSignBit = 31;
+
+// These three loops are over all pixels, and vectorised: no branch, and arrays that are told not to
+// overlap.
+
+void convert(const std::uint16_t* __restrict pixels, std::size_t width, const DepthLimits& limits,
+             const float* __restrict reference, float* __restrict mask, float* __restrict q) {
+  const auto [min, max, scale] = limits;
+  for (std::size_t x = 0; x < width; ++x) {
+    const std::int32_t counts = pixels[x];
+    // All ones where neither difference is negative; comparisons would become branches.
+    const std::int32_t inside = ~((counts - min) | (max - counts)) >> kSignBit;
+    const auto usable = static_cast<float>(inside & 1);
+    const auto divisor = static_cast<float>(counts | (1 & ~inside));  // never 0
+    mask[x] = usable;
+    q[x] = usable * (scale / divisor - reference[x]);
+  }
+}
+
+void add_mask(const float* __restrict mask, std::size_t width, float v, float* __restrict count,
+              float* __restrict sum_v, float* __restrict sum_vv) {
+  for (std::size_t x = 0; x < width; ++x) {
+    count[x] += mask[x];
+    sum_v[x] += mask[x] * v;
+    sum_vv[x] += mask[x] * (v * v);
+  }
+}
+
+void add_inverse_depth(const float* __restrict q, std::size_t width, float v,
+                       float* __restrict sum_q, float* __restrict sum_qv,
+                       float* __restrict sum_qq) {
+  for (std::size_t x = 0; x < width; ++x) {
+    sum_q[x] += q[x];
+    sum_qv[x] += q[x] * v;
+    sum_qq[x] += q[x] * q[x];
+  }
+}
+
+/// Least-squares plane q = offset + slope . ray through the points of neighbouring cells.
+struct PlaneFit {
+  float count = 0;
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  Eigen::Matrix2f products = Eigen::Matrix2f::Zero();
+  Eigen::Vector2f with_q = Eigen::Vector2f::Zero();
+  float sum_q = 0;
+  float squares = 0;  ///< of q; after solve() of the residuals
+  Eigen::Vector2f slope = Eigen::Vector2f::Zero();
+  Eigen::Vector2f spread = Eigen::Vector2f::Zero();  ///< sums of squares about the mean ray
+
+  void add(const Eigen::Vector2f& ray, float q) {
+    count += 1.0F;
+    sum += ray;
+    products += ray * ray.transpose();
+    with_q += q * ray;
+    sum_q += q;
+    squares += q * q;
+  }
+
+  /// False where the cells are too few or on one line.
+  bool solve() {
+    if (count < kMinNeighbourhood) {
+      return false;
+    }
+    const Eigen::Matrix2f scatter = products - sum * sum.transpose() / count;
+    const Eigen::Vector2f right = with_q - sum * (sum_q / count);
+    spread = scatter.diagonal();
+    const float determinant = scatter(0, 0) * scatter(1, 1) - scatter(0, 1) * scatter(0, 1);
+    if (determinant < kMinSpread * spread.prod()) {
+      return false;
+    }
+    slope.x() = (scatter(1, 1) * right.x() - scatter(0, 1) * right.y()) / determinant;
+    slope.y() = (scatter(0, 0) * right.y() - scatter(0, 1) * right.x()) / determinant;
+    squares -= sum_q * sum_q / count + slope.dot(right);
+    return true;
+  }
+};
 
 }  // namespace
 
@@ -23,10 +117,17 @@ struct DepthCloud::Sums {
 
 DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m,
                        const DepthCloudConfig& config)
-    : grid_{std::move(grid)}, config_{config}, unit_m_{static_cast<float>(depth_unit_m)} {
+    : grid_{std::move(grid)},
+      config_{config},
+      unit_m_{static_cast<float>(depth_unit_m)},
+      tangent_scale_{static_cast<float>(grid_->cell_px() * grid_->cell_px() /
+                                        (12.0 * grid_->camera().fx * grid_->camera().fy))},
+      min_cosine_{
+          static_cast<float>(std::cos(config.max_incidence_deg * std::numbers::pi / 180.0))} {
   config_.cell_px = grid_->cell_px();
   surfels_.resize(grid_->size());
   valid_.reserve(grid_->size());
+  smoothed_.reserve(grid_->size());
   columns_.resize(kColumnSums * static_cast<std::size_t>(grid_->columns() * grid_->cell_px()));
 }
 
@@ -52,6 +153,7 @@ Result<void> DepthCloud::build(const FrameRef& depth) {
       }
     }
   }
+  smooth_normals();
   return {};
 }
 
@@ -68,8 +170,14 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
   float* const sum_qv = columns_.data() + kQV * width;
   float* const sum_qq = columns_.data() + kQQ * width;
   const float to_counts = 1.0F / unit_m_;
-  const float min_counts = static_cast<float>(config_.min_depth_m) * to_counts;
-  const float max_counts = static_cast<float>(config_.max_depth_m) * to_counts;
+  float* const mask = columns_.data() + kMask * width;
+  float* const q = columns_.data() + kRowQ * width;
+  const auto to_int = [&](double depth_m) {
+    constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+    return static_cast<std::int32_t>(
+        std::clamp(depth_m * static_cast<double>(to_counts), 1.0, kMost));
+  };
+  const DepthLimits limits{to_int(config_.min_depth_m), to_int(config_.max_depth_m), to_counts};
 
   // A reference near the cell's own inverse depth keeps the squares' digits in single precision.
   const auto* const middle = depth.row<std::uint16_t>(cell_row * px + px / 2);
@@ -84,18 +192,9 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
   for (int i = 0; i < px; ++i) {
     const auto* const pixels = depth.row<std::uint16_t>(cell_row * px + i);
     const float v = static_cast<float>(i) - 0.5F * static_cast<float>(px - 1);
-    for (std::size_t x = 0; x < width; ++x) {
-      const auto counts = static_cast<float>(static_cast<std::int32_t>(pixels[x]));
-      const bool usable = counts >= min_counts && counts <= max_counts;
-      const float mask = usable ? 1.0F : 0.0F;
-      const float q = mask * (to_counts / std::max(counts, 1.0F) - reference[x]);
-      count[x] += mask;
-      sum_v[x] += mask * v;
-      sum_vv[x] += mask * v * v;
-      sum_q[x] += q;
-      sum_qv[x] += q * v;
-      sum_qq[x] += q * q;
-    }
+    convert(pixels, width, limits, reference, mask, q);
+    add_mask(mask, width, v, count, sum_v, sum_vv);
+    add_inverse_depth(q, width, v, sum_q, sum_qv, sum_qq);
   }
 }
 
@@ -162,30 +261,78 @@ Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcep
   if (variance > config_.max_plane_rms * config_.max_plane_rms * sigma2) {
     return {};
   }
-  // q = (n . ray) / d: with slope per ray coordinate g, n is along (g, q - g . ray), d = 1 / |...|.
+  // A plane n . X = 1 has q = n . ray: n is (g, q - g . ray) with g the slope of q in the ray's
+  // coordinates. A change e of q moves the point by z e / |n| along the normal.
   const Eigen::Vector2d at =
       ray.centre.cast<double>() + ray.per_pixel.cast<double>() * Eigen::Vector2d{u, v};
   const double inverse_depth = q + sums.reference;
   const Eigen::Vector2d g = ray.per_pixel.cast<double>().inverse().transpose() * slope;
-  const Eigen::Vector3d normal{g.x(), g.y(), inverse_depth - g.dot(at)};
-  const double inverse_distance = normal.norm();
+  const Eigen::Vector3d n{g.x(), g.y(), inverse_depth - g.dot(at)};
+  const double norm = n.norm();
   const double z = 1.0 / inverse_depth;
-  const double cosine = inverse_depth / (inverse_distance * std::sqrt(1.0 + at.squaredNorm()));
-  if (cosine < std::cos(config_.max_incidence_deg * std::numbers::pi / 180.0)) {
+  if (inverse_depth < static_cast<double>(min_cosine_) * norm * std::sqrt(1.0 + at.squaredNorm())) {
     return {};
   }
-  // Moving the inverse depth by e moves the point by z e / |n| along the unit normal.
-  const double normal_sigma2 =
-      z * z * std::max(variance, sigma2) / (inverse_distance * inverse_distance);
-  const double side =
-      grid_->cell_px() * z * std::sqrt(std::abs(ray.per_pixel.cast<double>().determinant()));
+  const double independent = std::max(1.0, sums.n / config_.correlated_pixels);
   Surfel surfel;
   surfel.point = (z * at.homogeneous()).cast<float>();
-  surfel.normal = (-normal / inverse_distance).cast<float>();
+  surfel.normal = (-n / norm).cast<float>();
   surfel.normal_variance =
-      static_cast<float>(normal_sigma2 * std::min(1.0, config_.correlated_pixels / sums.n));
-  surfel.tangent_variance = static_cast<float>(side * side / 12.0);
+      static_cast<float>(z * z * std::max(variance, sigma2) / (norm * norm * independent));
+  surfel.tilt_variance =
+      surfel.normal_variance / (tangent_scale_ * surfel.point.z() * surfel.point.z());
   return surfel;
+}
+
+/// A cell is too small for a good normal. Where its neighbours continue its surface, the plane
+/// through all their points (again: inverse depth linear in the ray) has a slope several times more
+/// certain.
+void DepthCloud::smooth_normals() {
+  smoothed_.clear();
+  for (const std::uint32_t cell : valid_) {
+    smoothed_.push_back(smoothed_normal(cell));
+  }
+  for (std::size_t i = 0; i < valid_.size(); ++i) {
+    surfels_[valid_[i]].normal = smoothed_[i].head<3>();
+    surfels_[valid_[i]].tilt_variance = smoothed_[i].w();
+  }
+}
+
+Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
+  const Surfel& centre = surfels_[cell];
+  const Eigen::Vector4f own{centre.normal.x(), centre.normal.y(), centre.normal.z(),
+                            centre.tilt_variance};
+  const float q0 = 1.0F / centre.point.z();
+  const Eigen::Vector2f ray0 = q0 * centre.point.head<2>();
+  const Eigen::Vector2f slope = centre.normal.head<2>() / centre.normal.dot(centre.point);
+  const auto sigma = static_cast<float>(config_.inverse_depth_sigma);
+  const int columns = grid_->columns();
+  const int column = static_cast<int>(cell) % columns;
+  const int row = static_cast<int>(cell) / columns;
+  PlaneFit plane;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_->rows() - 1); ++r) {
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
+      const Surfel& other = surfels_[static_cast<std::size_t>(r * columns + c)];
+      if (!other.valid()) {
+        continue;
+      }
+      const float other_q = 1.0F / other.point.z();
+      const Eigen::Vector2f ray = other_q * other.point.head<2>() - ray0;
+      if (std::abs(other_q - q0 - slope.dot(ray)) <= kNeighbourSigmas * sigma) {
+        plane.add(ray, other_q - q0);
+      }
+    }
+  }
+  if (!plane.solve() || plane.squares > (plane.count - 3.0F) * sigma * sigma) {
+    return own;  // alone, curved, or a fold
+  }
+  const Eigen::Vector3f normal{plane.slope.x(), plane.slope.y(), q0 - plane.slope.dot(ray0)};
+  const float z2 = centre.point.z() * centre.point.z();
+  Eigen::Vector4f result;
+  result.head<3>() = -normal.normalized();
+  result.w() =
+      std::min(centre.tilt_variance, centre.normal_variance / (z2 * plane.spread.minCoeff()));
+  return result;
 }
 
 }  // namespace geoflow::slam

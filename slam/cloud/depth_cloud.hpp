@@ -37,19 +37,15 @@ struct DepthCloudConfig {
 };
 
 /// One small piece of surface in the camera frame [m]. Its covariance is plane-shaped, as in
-/// generalised ICP: normal_variance along the normal, tangent_variance along the other two
+/// generalised ICP: normal_variance along the normal, tangent_variance() along the other two
 /// directions.
 struct Surfel {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();
   float normal_variance = 0;                         ///< [m^2]; 0: no surfel here
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, towards the camera
-  float tangent_variance = 0;                        ///< [m^2]
+  float tilt_variance = 0;  ///< of the normal's direction, about each tangent [rad^2]
 
   [[nodiscard]] bool valid() const noexcept { return normal_variance > 0.0F; }
-  /// Variance of the normal's direction about each tangent [rad^2]: that of the slope of a plane
-  /// fitted to a square patch, whose side is sqrt(12 tangent_variance) and whose mean has
-  /// normal_variance.
-  [[nodiscard]] float tilt_variance() const noexcept { return normal_variance / tangent_variance; }
 };
 
 /// A depth image as an organised grid of surfels: at most one a cell of the CellGrid. One pass over
@@ -73,20 +69,27 @@ class DepthCloud {
   /// The cells that hold a surfel, ascending.
   [[nodiscard]] std::span<const std::uint32_t> valid() const noexcept { return valid_; }
   [[nodiscard]] std::size_t size() const noexcept { return valid_.size(); }
+  /// A surfel's variance within its surface at z = 1 m [m^2], growing with z^2: that of a point
+  /// drawn from its cell.
+  [[nodiscard]] float tangent_scale() const noexcept { return tangent_scale_; }
 
  private:
   struct Sums;
   void accumulate_row_of_cells(const FrameRef& depth, int cell_row);
   [[nodiscard]] Sums sums_of_cell(int column) const noexcept;
   [[nodiscard]] Surfel fit(const Sums& sums, const CellGrid::Ray& ray) const noexcept;
+  void smooth_normals();
+  [[nodiscard]] Eigen::Vector4f smoothed_normal(std::uint32_t cell) const noexcept;
 
   std::shared_ptr<const CellGrid> grid_;
   DepthCloudConfig config_;
   float unit_m_;
+  float tangent_scale_;  ///< see tangent_scale()
+  float min_cosine_;     ///< of the angle of incidence
   std::vector<Surfel> surfels_;
   std::vector<std::uint32_t> valid_;
-  std::vector<float>
-      columns_;  ///< sums over one row of cells, for each image column: see accumulate_row_of_cells
+  std::vector<Eigen::Vector4f> smoothed_;  ///< normal and tilt variance of each valid surfel
+  std::vector<float> columns_;             ///< sums over a row of cells for each image column
 };
 
 }  // namespace geoflow::slam

@@ -10,6 +10,9 @@
 namespace geoflow::slam {
 namespace {
 
+/// Of a stage's misalignment_m [m, or rad at about 1 m]: a smaller step ends the stage.
+constexpr double kSettledPart = 0.03;
+
 /// H in coordinates in which rotation and translation compare: rotation in units of 1 / scale_m.
 struct Spectrum {
   double scale_m = 1;
@@ -109,8 +112,10 @@ RegistrationResult register_clouds(const DepthCloud& source, const DepthCloud& t
       const Vector6d step = solve(system, spectrum);
       result.T_target_source = result.T_target_source * SE3::exp(step);
       ++result.iterations;
-      if (step.head<3>().norm() < config.rotation_epsilon_rad &&
-          step.tail<3>().norm() < config.translation_epsilon_m) {
+      // A stage that tolerates a misalignment need not settle to more than a part of it.
+      const double settled = kSettledPart * stage.misalignment_m;
+      if (step.head<3>().norm() < std::max(config.rotation_epsilon_rad, settled) &&
+          step.tail<3>().norm() < std::max(config.translation_epsilon_m, settled)) {
         result.converged = true;
         break;
       }

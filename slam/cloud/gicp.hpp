@@ -57,15 +57,15 @@ struct GicpConfig {
                                     .max_iterations = 8}};
   double min_normal_cosine = 0.8;  ///< of the angle between paired normals (37 degrees)
   double kernel_sigmas = 2.5;      ///< Cauchy kernel's width in standard deviations of a residual
-  double rotation_epsilon_rad = 1e-5;  ///< a step below both ends a stage
-  double translation_epsilon_m = 1e-5;
+  double rotation_epsilon_rad = 3e-5;  ///< a step below both ends a stage
+  double translation_epsilon_m = 3e-5;
   std::size_t min_inliers = 100;  ///< fewer pairs: not converged
   /// Information is divided by this for what the residuals share (sensor's fixed pattern,
   /// correlated noise).
-  double covariance_inflation = 4.0;
+  double covariance_inflation = 64.0;
   /// A direction is open when its information is less than this many times what noise in the
   /// normals feigns.
-  double min_information_ratio = 0.25;
+  double min_information_ratio = 4.0;
   /// A direction is open when the pairs constrain it worse than this [m] (rotations: at 1 m).
   double max_sigma_m = 0.02;
 };

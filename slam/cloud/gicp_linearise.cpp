@@ -45,6 +45,8 @@ struct Problem {
         extra_variance{static_cast<float>(stage.misalignment_m * stage.misalignment_m)},
         min_cosine{static_cast<float>(config.min_normal_cosine)},
         inverse_kernel2{static_cast<float>(1.0 / (config.kernel_sigmas * config.kernel_sigmas))},
+        source_tangent{source_cloud.tangent_scale()},
+        target_tangent{target_cloud.tangent_scale()},
         search{stage.search_cells} {}
 
   std::span<const Surfel> source;
@@ -56,6 +58,8 @@ struct Problem {
   float extra_variance;
   float min_cosine;
   float inverse_kernel2;
+  float source_tangent;  ///< variance within a surfel's surface at z = 1 m
+  float target_tangent;
   int search;
 };
 
@@ -75,7 +79,8 @@ const Surfel* acceptable(const Problem& problem, std::size_t cell, const Eigen::
   return &candidate;
 }
 
-/// The nearest acceptable surfel in the projected cell and its neighbours; null if there is none.
+/// The acceptable surfel of the projected cell, else the nearest one of its neighbours; null if
+/// there is none.
 const Surfel* associate(const Problem& problem, const Eigen::Vector3f& point,
                         const Eigen::Vector3f& normal) {
   const auto cell = problem.grid.project(point);
@@ -83,12 +88,16 @@ const Surfel* associate(const Problem& problem, const Eigen::Vector3f& point,
     return nullptr;
   }
   const int columns = problem.grid.columns();
+  const Surfel* best = nullptr;
+  float distance2 = problem.max_distance2;
+  const auto middle = static_cast<std::size_t>(cell->y() * columns + cell->x());
+  if (const Surfel* const hit = acceptable(problem, middle, point, normal, distance2)) {
+    return hit;
+  }
   const int first_row = std::max(cell->y() - problem.search, 0);
   const int last_row = std::min(cell->y() + problem.search, problem.grid.rows() - 1);
   const int first_column = std::max(cell->x() - problem.search, 0);
   const int last_column = std::min(cell->x() + problem.search, columns - 1);
-  const Surfel* best = nullptr;
-  float distance2 = problem.max_distance2;
   for (int row = first_row; row <= last_row; ++row) {
     for (int column = first_column; column <= last_column; ++column) {
       const auto index = static_cast<std::size_t>(row * columns + column);
@@ -102,7 +111,8 @@ const Surfel* associate(const Problem& problem, const Eigen::Vector3f& point,
 
 /// Adds the pair of `source` with its associate, if it has one. Equations: docs/gicp.md.
 void add(const Problem& problem, const Surfel& source, float sample_weight, Partial& partial) {
-  const Eigen::Vector3f point = problem.R * source.point + problem.t;
+  const Eigen::Vector3f& p = source.point;
+  const Eigen::Vector3f point = problem.R * p + problem.t;
   const Eigen::Vector3f normal = problem.R * source.normal;
   const Surfel* const target = associate(problem, point, normal);
   if (target == nullptr) {
@@ -114,7 +124,8 @@ void add(const Problem& problem, const Surfel& source, float sample_weight, Part
   // n^T C n with n half-way between the normals: cos^2 and sin^2 of half the angle between them.
   const float sine2 = std::max(0.0F, 0.5F * (1.0F - cosine));
   const float variance = (1.0F - sine2) * (source.normal_variance + target->normal_variance) +
-                         sine2 * (source.tangent_variance + target->tangent_variance) +
+                         sine2 * (problem.source_tangent * p.z() * p.z() +
+                                  problem.target_tangent * target->point.z() * target->point.z()) +
                          problem.extra_variance;
   const float inverse_variance = 1.0F / variance;
   const float error2 = residual * residual * inverse_variance;
@@ -123,13 +134,12 @@ void add(const Problem& problem, const Surfel& source, float sample_weight, Part
   const float weight = sample_weight * kernel * inverse_variance;
 
   const Eigen::Vector3f m = problem.R.transpose() * common;
-  const Eigen::Vector3f& p = source.point;
   Vector8f row;
   row << p.y() * m.z() - p.z() * m.y(), p.z() * m.x() - p.x() * m.z(),
       p.x() * m.y() - p.y() * m.x(), m.x(), m.y(), m.z(), residual, 0.0F;
   partial.system.noalias() += (weight * row) * row.transpose();
-  const float tilt_variance = 0.25F * (source.tilt_variance() + target->tilt_variance());
-  const Eigen::Vector4f homogeneous = source.point.homogeneous();
+  const float tilt_variance = 0.25F * (source.tilt_variance + target->tilt_variance);
+  const Eigen::Vector4f homogeneous = p.homogeneous();
   partial.noise.noalias() += (weight * tilt_variance * homogeneous) * homogeneous.transpose();
   partial.cost += static_cast<double>(sample_weight * std::log(excess) / problem.inverse_kernel2);
   partial.squared_error += static_cast<double>(sample_weight * kernel * error2);
