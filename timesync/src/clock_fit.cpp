@@ -155,8 +155,9 @@ bool ClockFit::jumped(const StampPair& pair, double residual_ns) noexcept {
   return jump_.add(pair.device_ns, residual_ns, gate, config_.jump_samples, span.count());
 }
 
-/// An outlier's place. Late: where the line says; later than is believable, or early: a usual delay before its arrival.
-/// A late sample's bound is all of its lateness, so that it covers both: a slow transport, and a clock that jumped.
+/// An outlier's place. Late: where the line says; later than is believable, or early: a usual delay
+/// before its arrival. A late sample's bound is all of its lateness, so that it covers both: a slow
+/// transport, and a clock that jumped.
 Placed ClockFit::place_doubtful(const StampPair& pair, double residual_ns) const noexcept {
   const double lateness = std::clamp(residual_ns, 0.0, static_cast<double>(kFarNs));
   Placed placed;
@@ -164,7 +165,8 @@ Placed ClockFit::place_doubtful(const StampPair& pair, double residual_ns) const
     placed = place(pair.device_ns);
   } else {
     const std::int64_t usual_delay = round_ns(spread_.median_ns());
-    placed = {pair.arrival_ns - usual_delay, std::max(config_.first_bound.count(), usual_delay), true};
+    placed = {pair.arrival_ns - usual_delay, std::max(config_.first_bound.count(), usual_delay),
+              true};
   }
   placed.error_bound_ns = std::max(placed.error_bound_ns, round_ns(lateness));
   return placed;
