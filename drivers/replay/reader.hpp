@@ -15,6 +15,7 @@
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
 
 /// What every recording format is turned into: one sequence of events in order of arrival.
 namespace geoflow::drivers {
@@ -53,6 +54,7 @@ struct FoundCalibration {
   std::optional<CameraIntrinsics> camera{};
   std::optional<double> depth_unit_m{};
   std::optional<SE3> T_cam_imu{};
+  std::optional<Duration> timeshift_cam_imu{};
   std::optional<ImuNoise> imu_noise{};
   std::optional<SE3> T_base_cam{};
   std::string source;  ///< file or topics, for people

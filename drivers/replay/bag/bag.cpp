@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -112,7 +113,9 @@ Result<std::unique_ptr<Bag>> Bag::open(const fs::path& path) {
     return fail(ErrorCode::kNotFound, "{}: holds no bag: neither metadata.yaml nor a .db3 file",
                 path.native());
   }
-  std::ranges::stable_sort(bag->parts_, {}, &Part::start_ns);
+  std::ranges::sort(bag->parts_, [](const Part& a, const Part& b) {
+    return std::tie(a.start_ns, a.path) < std::tie(b.start_ns, b.path);
+  });
   // A bag that cannot be read should say so now. Kept open: a compressed file is decompressed once.
   auto first = open_part(bag->parts_.front());
   if (!first) {

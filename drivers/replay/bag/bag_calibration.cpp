@@ -102,6 +102,7 @@ FoundCalibration find_bag_calibration(Bag& bag, const TopicChoice& choice, const
   FoundCalibration found{.camera = collector.camera(),
                          .depth_unit_m = extras.depth_unit_m.value_or(kRosDepthUnitM),
                          .T_cam_imu = std::nullopt,
+                         .timeshift_cam_imu = extras.timeshift_cam_imu,
                          .imu_noise = extras.imu_noise,
                          .T_base_cam = std::nullopt,
                          .source = choice.camera_info};

@@ -1,7 +1,6 @@
 #include "replay/bag/bag_file.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <fmt/core.h>
@@ -25,17 +25,54 @@
 namespace geoflow::drivers::bag {
 namespace {
 
+constexpr std::string_view kSqliteMagic{"SQLite format 3\0", 16};
+constexpr std::size_t kSqliteHeaderBytes = 100;
+
 /// The first bytes of a file; fewer where it is shorter, none where it cannot be read.
-template <std::size_t Size>
 std::string head_of(const std::filesystem::path& path) {
-  std::string head(Size, '\0');
+  std::string head(kSqliteHeaderBytes, '\0');
   std::ifstream file{path, std::ios::binary};
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
   return head;
 }
 
-constexpr std::string_view kSqliteMagic{"SQLite format 3\0", 16};
+std::uint64_t big_endian(std::string_view bytes) {
+  std::uint64_t value = 0;
+  for (const char c : bytes) {
+    value = value * 256U + static_cast<unsigned char>(c);
+  }
+  return value;
+}
+
+/// How many bytes the database has by its own header (SQLite file format, 1.3); 0 where that does
+/// not say.
+std::uint64_t stated_size(std::string_view head) {
+  const std::string_view header = head.substr(0, kSqliteHeaderBytes);
+  constexpr std::size_t kPageSizeAt = 16;
+  constexpr std::size_t kChangeCounterAt = 24;
+  constexpr std::size_t kPageCountAt = 28;
+  constexpr std::size_t kValidForAt = 92;
+  if (header.size() < kSqliteHeaderBytes ||
+      header.substr(kChangeCounterAt, 4) != header.substr(kValidForAt, 4)) {
+    return 0;
+  }
+  const std::uint64_t page_size = big_endian(header.substr(kPageSizeAt, 2));
+  return big_endian(header.substr(kPageCountAt, 4)) * (page_size == 1 ? 1U << 16U : page_size);
+}
+
+Result<void> check_size(std::string_view head, const std::filesystem::path& path) {
+  // Pages may still be in the log of a writer that did not end well.
+  std::error_code error;
+  const bool has_log = std::filesystem::exists(path.native() + "-wal", error);
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (!has_log && !error && size < std::max<std::uint64_t>(stated_size(head), kSqliteHeaderBytes)) {
+    return fail(ErrorCode::kInvalidData,
+                "is cut off: {} bytes are there, {} belong to the database", size,
+                stated_size(head));
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -51,7 +88,7 @@ Result<std::unique_ptr<BagFile>> BagFile::open(const std::filesystem::path& path
 }
 
 Result<void> BagFile::open_database() {
-  const std::string head = head_of<kSqliteMagic.size()>(path_);
+  std::string head = head_of(path_);
   std::filesystem::path database_path = path_;
   if (is_zstd(std::as_bytes(std::span{head}))) {
     auto decompressed = decompress_file(path_, kMaxDecompressedBytes);
@@ -60,13 +97,18 @@ Result<void> BagFile::open_database() {
     }
     decompressed_ = std::move(*decompressed);
     database_path = decompressed_->path();
-  } else if (head.empty()) {
+    head = head_of(database_path);
+  }
+  if (head.empty()) {
     return fail(ErrorCode::kInvalidData, "{}: is empty or cannot be read", path_.native());
-  } else if (!kSqliteMagic.starts_with(head)) {
+  }
+  if (!kSqliteMagic.starts_with(std::string_view{head}.substr(0, kSqliteMagic.size()))) {
     return fail(ErrorCode::kInvalidData, "{}: is neither an SQLite database nor a Zstandard file",
                 path_.native());
   }
-  auto database = Database::open_read_only(database_path);
+  auto database = check_size(head, database_path).and_then([&] {
+    return Database::open_read_only(database_path);
+  });
   if (!database) {
     return tl::unexpected{in_this_file(std::move(database).error())};
   }

@@ -148,7 +148,8 @@ ros::JointState to_message(const LegSample& sample) {
     }
   }
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-    add(fmt::format("{}_{}", kLegNames[leg], kFootName), {.tau_nm = sample.foot_force[leg]});
+    add(fmt::format("{}_{}", kLegNames[leg], kFootName),
+        {.tau_nm = static_cast<double>(sample.foot_force[leg])});
   }
   return message;
 }

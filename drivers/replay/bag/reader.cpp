@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,7 +12,6 @@
 
 #include <tl/expected.hpp>
 
-#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -69,20 +69,6 @@ Result<Event> sample_event(const BagMessage& message) {
   });
 }
 
-std::optional<StreamId> stream_of_topic(const TopicChoice& choice, std::string_view topic) {
-  if (topic.empty()) {
-    return std::nullopt;
-  }
-  const std::array<std::pair<std::string_view, StreamId>, kStreamCount> chosen = {
-      {{choice.color, StreamId::kColor},
-       {choice.depth, StreamId::kDepth},
-       {choice.imu, StreamId::kImu},
-       {choice.legs, StreamId::kLegs},
-       {choice.odometry, StreamId::kBodyVelocity}}};
-  const auto* const found = std::ranges::find(chosen, topic, &decltype(chosen)::value_type::first);
-  return found == chosen.end() ? std::nullopt : std::optional{found->second};
-}
-
 class BagReader final : public RecordingReader {
  public:
   BagReader(std::unique_ptr<Bag> bag, TopicChoice choice)
@@ -100,13 +86,9 @@ class BagReader final : public RecordingReader {
       info_.streams.push_back({.name = topic.name,
                                .type = topic.type,
                                .count = topic.count,
-                               .stream = stream_of_topic(choice_, topic.name)});
+                               .stream = stream_of(topic.name)});
     }
-    bag_->select([this](std::string_view topic) {
-      return !topic.empty() &&
-             (topic == choice_.color || topic == choice_.depth || topic == choice_.imu ||
-              topic == choice_.legs || topic == choice_.odometry);
-    });
+    bag_->select([this](std::string_view topic) { return stream_of(topic).has_value(); });
   }
 
   [[nodiscard]] const RecordingInfo& info() const override { return info_; }
@@ -130,18 +112,30 @@ class BagReader final : public RecordingReader {
   }
 
  private:
+  [[nodiscard]] std::optional<StreamId> stream_of(std::string_view topic) const {
+    const std::array<std::pair<std::string_view, StreamId>, kStreamCount> streams{{
+        {choice_.color, StreamId::kColor},
+        {choice_.depth, StreamId::kDepth},
+        {choice_.imu, StreamId::kImu},
+        {choice_.legs, StreamId::kLegs},
+        {choice_.odometry, StreamId::kBodyVelocity},
+    }};
+    const auto found = std::ranges::find_if(
+        streams, [topic](const auto& stream) { return !topic.empty() && stream.first == topic; });
+    return found == streams.end() ? std::nullopt : std::optional{found->second};
+  }
   [[nodiscard]] Result<Event> to_event(const BagMessage& message) const {
-    if (message.topic == choice_.color) {
-      return image_event(message, ImageStream::kColor);
-    }
-    if (message.topic == choice_.depth) {
-      return image_event(message, ImageStream::kDepth);
-    }
-    if (message.topic == choice_.imu) {
-      return sample_event<ros::Imu, ImuClock, ImuSample>(message);
-    }
-    if (message.topic == choice_.legs) {
-      return sample_event<ros::JointState, LegClock, LegSample>(message);
+    switch (stream_of(message.topic).value_or(StreamId::kBodyVelocity)) {
+      case StreamId::kColor:
+        return image_event(message, ImageStream::kColor);
+      case StreamId::kDepth:
+        return image_event(message, ImageStream::kDepth);
+      case StreamId::kImu:
+        return sample_event<ros::Imu, ImuClock, ImuSample>(message);
+      case StreamId::kLegs:
+        return sample_event<ros::JointState, LegClock, LegSample>(message);
+      case StreamId::kBodyVelocity:
+        break;
     }
     return sample_event<ros::Odometry, LegClock, BodyVelocitySample>(message);
   }

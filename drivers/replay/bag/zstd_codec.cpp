@@ -135,7 +135,7 @@ Result<std::vector<std::byte>> decompress(std::span<const std::byte> frame) {
 
 struct Compressor::State {
   struct Free {
-    void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+    void operator()(ZSTD_CCtx* owned) const { ZSTD_freeCCtx(owned); }
   };
   std::unique_ptr<ZSTD_CCtx, Free> context{ZSTD_createCCtx()};
   int level = 1;

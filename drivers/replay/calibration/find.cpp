@@ -140,6 +140,8 @@ Result<Calibration> find_calibration(const RecordingOptions& options,
   }
   if (calibration && !calibration->T_cam_imu) {
     calibration->T_cam_imu = found.T_cam_imu;
+    calibration->timeshift_cam_imu =
+        found.timeshift_cam_imu.value_or(calibration->timeshift_cam_imu);
   }
   if (calibration && !calibration->T_base_cam) {
     calibration->T_base_cam = found.T_base_cam;

@@ -252,8 +252,13 @@ TEST(BagRoundTrip, CalibrationComesBack) {
   EXPECT_LT((found.T_base_cam->matrix() - expected.T_base_cam->matrix()).norm(), kRounding);
   ASSERT_TRUE(found.T_cam_imu);
   EXPECT_LT((found.T_cam_imu->matrix() - expected.T_cam_imu->matrix()).norm(), kRounding);
+  EXPECT_EQ(found.timeshift_cam_imu, expected.timeshift_cam_imu);
   ASSERT_TRUE(found.imu_noise);
   EXPECT_EQ(found.imu_noise->accel_noise_density, 0.0123);
+  EXPECT_TRUE(reader->info().has(StreamId::kColor));
+  EXPECT_TRUE(reader->info().has(StreamId::kDepth));
+  EXPECT_TRUE(reader->info().has(StreamId::kImu));
+  EXPECT_FALSE(reader->info().has(StreamId::kLegs));
   EXPECT_EQ(reader->stamps().camera.domain, StampDomain::kHost);
   EXPECT_EQ(reader->stamps().imu.domain, StampDomain::kDevice);
   EXPECT_EQ(reader->stamps().imu.wrap, Duration{4'294'967'296'000});
