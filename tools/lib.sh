@@ -1,3 +1,4 @@
+# shellcheck shell=bash disable=SC2034
 # What tools/run, tools/test and .ci/run share: messages, packages, configure and build. To be sourced by bash.
 # After sourcing, the working directory is the top of the project; the one before is in started_in.
 
@@ -53,7 +54,7 @@ need_packages() {
 
 # build PRESET [TARGET…] [-- CMAKE_OPTION…]: configures build/PRESET and builds the targets, or all.
 build() {
-  local preset=$1 targets=() target
+  local preset=$1 targets=()
   shift
   while [ $# -gt 0 ] && [ "$1" != -- ]; do
     targets+=("$1")
