@@ -14,6 +14,8 @@ namespace geoflow::tools {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
+/// More frames than any trajectory file holds.
+constexpr double kMaxFrames = 1e9;
 constexpr double kHalfTurnDeg = 180.0;
 
 double step_m(const PosePairs& pairs, std::size_t k) {
@@ -128,7 +130,7 @@ Result<void> check(const RelativeOptions& options) {
                 "the delta of relative errors must be a positive number");
   }
   if (options.unit == DeltaUnit::kFrames &&
-      (options.delta != std::floor(options.delta) || options.delta > 1e9)) {
+      (options.delta != std::floor(options.delta) || options.delta > kMaxFrames)) {
     return fail(ErrorCode::kInvalidArgument, "a delta in frames must be a whole number below 1e9");
   }
   if (options.unit == DeltaUnit::kDegrees && options.delta > kHalfTurnDeg) {
