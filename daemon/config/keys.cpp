@@ -1,0 +1,148 @@
+#include "config/keys.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "geoflow/daemon/config.hpp"
+
+// The bounds below are the values for which the code is meant and tested; each is stated with its
+// key in config/geoflow.toml. NOLINTBEGIN(readability-magic-numbers)
+namespace geoflow::daemon {
+namespace {
+
+constexpr double kLargestSeed = 9e15;  // whole numbers that a double holds exactly
+
+void bind_source(SourceConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"source.replay", &c.replay});
+  keys.push_back({"source.calibration", &c.calibration});
+  keys.push_back({"source.faults", &c.faults});
+  keys.push_back({"source.fault_seed", &c.fault_seed, 0, kLargestSeed});
+  keys.push_back({"source.realtime", &c.realtime});
+  keys.push_back({"source.loop", &c.loop});
+}
+
+void bind_topics(drivers::TopicNames& c, std::vector<Key>& keys) {
+  keys.push_back({"topics.color", &c.color});
+  keys.push_back({"topics.depth", &c.depth});
+  keys.push_back({"topics.camera_info", &c.camera_info});
+  keys.push_back({"topics.imu", &c.imu});
+  keys.push_back({"topics.legs", &c.legs});
+  keys.push_back({"topics.odometry", &c.odometry});
+  keys.push_back({"topics.base_frame", &c.base_frame});
+}
+
+void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"synchroniser.depth_tolerance_s", &c.depth_tolerance, 0, 1});
+  keys.push_back({"synchroniser.share_depth", &c.share_depth});
+  keys.push_back({"synchroniser.max_wait_s", &c.max_wait, 0, 10});
+  keys.push_back({"synchroniser.silent_after_s", &c.silent_after, 0.001, 60});
+  keys.push_back({"synchroniser.max_step_s", &c.max_step, 0.1, 3600});
+  keys.push_back({"synchroniser.frame_capacity", &c.frame_capacity, 2, 64});
+  keys.push_back({"synchroniser.sample_capacity", &c.sample_capacity, 16, 65536});
+  keys.push_back({"synchroniser.clock.first_bound_s", &c.clock.first_bound, 0, 1});
+  keys.push_back({"synchroniser.clock.min_delay_s", &c.clock.min_delay, 0, 1});
+  keys.push_back({"synchroniser.clock.resolution_s", &c.clock.resolution, 1e-9, 0.1});
+  keys.push_back({"synchroniser.clock.max_delay_s", &c.clock.max_delay, 0.001, 60});
+  keys.push_back({"synchroniser.clock.max_drift", &c.clock.max_drift, 0, 0.01});
+}
+
+void bind_slam_front(slam::Config& c, std::vector<Key>& keys) {
+  keys.push_back({"slam.switches.optical_flow", &c.switches.optical_flow});
+  keys.push_back({"slam.switches.gicp", &c.switches.gicp});
+  keys.push_back({"slam.features.cell_px", &c.features.cell_px, 8, 200});
+  keys.push_back({"slam.features.features_per_cell", &c.features.features_per_cell, 1, 20});
+  keys.push_back({"slam.features.fast_threshold", &c.features.fast_threshold, 1, 200});
+  keys.push_back(
+      {"slam.features.fast_threshold_minimum", &c.features.fast_threshold_minimum, 1, 200});
+  keys.push_back({"slam.features.mask_radius_px", &c.features.mask_radius_px, 0, 100});
+  keys.push_back({"slam.flow.window_px", &c.flow.window_px, 5, 61});
+  keys.push_back({"slam.flow.prior_levels", &c.flow.prior_levels, 0, 6});
+  keys.push_back({"slam.flow.levels", &c.flow.levels, 0, 6});
+  keys.push_back({"slam.flow.forward_backward_px", &c.flow.forward_backward_px, 0.01, 20});
+  keys.push_back({"slam.flow.fundamental_threshold_px", &c.flow.fundamental_threshold_px, 0.1, 20});
+}
+
+void bind_slam_back(slam::Config& c, std::vector<Key>& keys) {
+  keys.push_back({"slam.pose.pixel_sigma", &c.pose.pixel_sigma, 0.01, 20});
+  keys.push_back({"slam.pose.minimum_visual_inliers", &c.pose.minimum_visual_inliers, 6, 1000});
+  keys.push_back({"slam.pose.pnp_threshold_px", &c.pose.pnp_threshold_px, 0.1, 50});
+  keys.push_back({"slam.pose.gicp_targets", &c.pose.gicp_targets, 1, 20});
+  keys.push_back({"slam.pose.iterations", &c.pose.iterations, 1, 100});
+  keys.push_back({"slam.keyframes.translation_m", &c.keyframes.translation_m, 0.001, 10});
+  keys.push_back({"slam.keyframes.rotation_rad", &c.keyframes.rotation_rad, 0.001, 3.14});
+  keys.push_back({"slam.keyframes.overlap", &c.keyframes.overlap, 0, 1});
+  keys.push_back({"slam.keyframes.maximum_interval_s", &c.keyframes.maximum_interval, 0.01, 3600});
+  keys.push_back({"slam.mapping.window", &c.mapping.window, 2, 100});
+  keys.push_back({"slam.mapping.fixed", &c.mapping.fixed, 1, 200});
+  keys.push_back({"slam.mapping.gicp_neighbours", &c.mapping.gicp_neighbours, 0, 50});
+  keys.push_back({"slam.mapping.iterations", &c.mapping.iterations, 1, 100});
+  keys.push_back({"slam.mapping.depth_sigma_at_1m", &c.mapping.depth_sigma_at_1m, 1e-5, 1});
+}
+
+void bind_socket(SocketConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"socket.pose", &c.pose});
+  keys.push_back({"socket.control", &c.control});
+  keys.push_back({"socket.mode", &c.mode, 0, 0777});
+  keys.push_back({"socket.group", &c.group});
+  keys.push_back({"socket.clients", &c.clients, 1, 256});
+  keys.push_back({"socket.handshake_timeout_s", &c.handshake_timeout, 0.05, 60});
+  keys.push_back({"socket.stall_timeout_s", &c.stall_timeout, 0.05, 3600});
+}
+
+void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"pipeline.packet_queue", &c.packet_queue, 1, 64});
+  keys.push_back({"pipeline.image_queue", &c.image_queue, 2, 64});
+  keys.push_back({"pipeline.sample_queue", &c.sample_queue, 16, 65536});
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({substituted, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::vector<Key> bind_keys(Config& config) {
+  std::vector<Key> keys;
+  bind_source(config.source, keys);
+  bind_topics(config.topics, keys);
+  bind_synchroniser(config.synchroniser, keys);
+  bind_slam_front(config.slam, keys);
+  bind_slam_back(config.slam, keys);
+  bind_socket(config.socket, keys);
+  bind_pipeline(config.pipeline, keys);
+  return keys;
+}
+
+std::string nearest_key(const std::vector<Key>& keys, std::string_view unknown) {
+  constexpr std::size_t kLongestCompared = 128;
+  const std::string_view compared = unknown.substr(0, kLongestCompared);
+  std::size_t best = std::numeric_limits<std::size_t>::max();
+  std::string nearest;
+  for (const Key& key : keys) {
+    const std::size_t distance = edit_distance(compared, key.name);
+    if (distance < best) {
+      best = distance;
+      nearest = key.name;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace geoflow::daemon
+// NOLINTEND(readability-magic-numbers)

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/timesync/synchroniser_config.hpp"
+
+/// The daemon's configuration: plain structs, and the TOML files that set them. config/geoflow.toml
+/// documents every key. Functions here are pure apart from reading the named file; thread-safe.
+namespace geoflow::daemon {
+
+/// Where samples come from. An empty path: not given.
+struct SourceConfig {
+  std::filesystem::path replay;       ///< a recording
+  std::filesystem::path calibration;  ///< a folder with Kalibr files
+  std::filesystem::path faults;       ///< a fault script for the recording
+  std::uint64_t fault_seed = 0;
+  bool realtime = true;  ///< at the pace it was recorded; else as fast as it can be worked on
+  bool loop = false;     ///< begin again at its end
+};
+
+/// The two sockets and what their clients may do.
+struct SocketConfig {
+  std::filesystem::path pose = "/run/geoflow/pose.sock";
+  std::filesystem::path control = "/run/geoflow/ctl.sock";
+  int mode = 0660;    ///< permissions of both
+  std::string group;  ///< owning group of both; empty: the daemon's own
+  int clients = 32;   ///< at most, on each socket
+  Duration handshake_timeout = std::chrono::seconds{2};  ///< for HELLO
+  Duration stall_timeout =
+      std::chrono::seconds{5};  ///< a client that reads nothing for so long is cut off
+};
+
+/// Threads and queues of the live pipeline.
+struct PipelineConfig {
+  int packet_queue = 4;     ///< packets that may wait for the estimator; one more drops the oldest
+  int image_queue = 8;      ///< images of each kind that may wait for the synchroniser; likewise
+  int sample_queue = 1024;  ///< IMU samples, and leg samples, that may wait for the synchroniser
+};
+
+struct Config {
+  SourceConfig source;
+  drivers::TopicNames topics;
+  timesync::SynchroniserConfig synchroniser;
+  slam::Config slam;
+  SocketConfig socket;
+  PipelineConfig pipeline;
+};
+
+/// Defaults overlaid by a TOML file. Errors: kNotFound, kSystem for the file; kInvalidArgument,
+/// naming file, line and key, for a syntax error, an unknown key (with the nearest known one), a
+/// wrong type or a value out of range.
+[[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
+
+/// The same from text; `name` stands for the file in messages.
+[[nodiscard]] Result<Config> parse_config(std::string_view text, std::string_view name);
+
+/// Overlays one `section.key=value`, value as in TOML (a bare word is taken as a string). Errors as
+/// above.
+[[nodiscard]] Result<void> set_key(Config& config, std::string_view assignment);
+
+/// One key as it stands, value in TOML's notation.
+struct ConfigValue {
+  std::string key;
+  std::string value;
+};
+
+/// Every key there is, with its value in `config`.
+[[nodiscard]] std::vector<ConfigValue> list_keys(const Config& config);
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/slam/core.hpp"
+#include "geoflow/timesync/counters.hpp"
+
+namespace geoflow::daemon {
+
+/// Gets every estimate with its packet, on the thread that estimates. Must not block.
+using EstimateHandler = std::function<void(const SyncedPacket&, const PoseEstimate&)>;
+
+/// One source with one estimator and what is measured of them: what LockStepRunner and Pipeline
+/// work on.
+struct Run {
+  std::unique_ptr<drivers::RecordedStreams> streams;
+  std::unique_ptr<RunStatistics> statistics;
+  std::unique_ptr<slam::Core> core;
+  timesync::SynchroniserCounters synchroniser;  ///< filled when the run is over
+};
+
+/// Opens the configured source and makes an estimator for its calibration. Errors name file, line
+/// or key.
+[[nodiscard]] Result<Run> open_run(const Config& config);
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,266 @@
+#include "geoflow/daemon/pipeline.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include <pthread.h>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/run.hpp"
+#include "geoflow/hal/log.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/slam/core.hpp"
+#include "geoflow/slam/mapping.hpp"
+#include "geoflow/timesync/doorbell.hpp"
+#include "geoflow/timesync/drop_oldest_ring.hpp"
+#include "geoflow/timesync/spsc_ring.hpp"
+#include "geoflow/timesync/synchroniser.hpp"
+
+#include "pipeline/estimation.hpp"
+#include "pipeline/sample_queues.hpp"
+#include "pipeline/started_ports.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+using timesync::Doorbell;
+
+/// The doorbells of the three threads that wait.
+struct Bells {
+  Doorbell sync;
+  Doorbell slam;
+  Doorbell map;
+
+  static Result<Bells> create() {
+    auto sync = Doorbell::create();
+    auto slam = Doorbell::create();
+    auto map = Doorbell::create();
+    for (const auto* bell : {&sync, &slam, &map}) {
+      if (!*bell) {
+        return tl::unexpected{bell->error()};
+      }
+    }
+    return Bells{.sync = std::move(*sync), .slam = std::move(*slam), .map = std::move(*map)};
+  }
+};
+
+}  // namespace
+
+class Pipeline::Implementation {
+ public:
+  Implementation(Run& run, const Config& config, EstimateHandler on_estimate,
+                 std::function<void()> on_end, Bells bells)
+      : run_{run},
+        on_estimate_{std::move(on_estimate)},
+        on_end_{std::move(on_end)},
+        bells_{std::move(bells)},
+        queues_{config.pipeline, run.statistics->counters, bells_.sync},
+        synchroniser_{config.synchroniser, synchroniser_streams(*run.streams)},
+        packets_{static_cast<std::size_t>(config.pipeline.packet_queue)},
+        ports_{*run.streams} {}
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
+  ~Implementation() { stop(); }
+
+  Result<void> start() {
+    auto started = ports_.start(queues_);
+    if (started) {
+      // From the end of the chain, so that each thread finds the next one there.
+      map_ = launch("map", &Implementation::map, &bells_.map);
+      slam_ = launch("slam", &Implementation::slam, &bells_.slam);
+      sync_ = launch("sync", &Implementation::synchronise, &bells_.sync);
+      replay_ = launch("replay", &Implementation::replay, nullptr);
+    }
+    return started;
+  }
+
+  void stop() {
+    for (std::jthread* thread : {&replay_, &sync_, &slam_, &map_}) {
+      thread->request_stop();
+    }
+    for (std::jthread* thread : {&replay_, &sync_, &slam_, &map_}) {
+      if (thread->joinable()) {
+        thread->join();
+      }
+    }
+    ports_.stop();
+    run_.synchroniser = synchroniser_.counters();
+  }
+
+ private:
+  using Body = void (Implementation::*)(const std::stop_token&);
+
+  /// A named thread; its stop token stops `bell` as well.
+  std::jthread launch(const char* name, Body body, Doorbell* bell) {
+    return std::jthread{[this, name, body, bell](const std::stop_token& stop) {
+      ::pthread_setname_np(::pthread_self(), name);
+      const std::stop_callback stop_bell{stop, [bell] {
+                                           if (bell != nullptr) {
+                                             bell->stop();
+                                           }
+                                         }};
+      (this->*body)(stop);
+    }};
+  }
+
+  void replay(const std::stop_token& stop) {
+    const auto played = run_.streams->play(stop);
+    if (!played) {
+      log::error("replay", "{}", played.error().message);
+    }
+    run_.statistics->counters.rejected.store(run_.streams->camera().health().rejected);
+    source_done_.store(!stop.stop_requested(), std::memory_order_release);
+    bells_.sync.ring();
+  }
+
+  void synchronise(const std::stop_token& /*stop*/) {
+    auto wake = Doorbell::Wake::kRung;
+    bool done = false;
+    while (!done && wake != Doorbell::Wake::kStopped) {
+      done = source_done_.load(std::memory_order_acquire);
+      queues_.drain(synchroniser_);
+      const HostTime now = HostClock::now();
+      while (auto packet = synchroniser_.pop(now)) {
+        forward(std::move(*packet));
+      }
+      if (!done) {
+        wake = bells_.sync.wait(time_to_deadline(now));
+      }
+    }
+    while (auto packet = done ? synchroniser_.flush() : std::nullopt) {
+      forward(std::move(*packet));
+    }
+    packets_done_.store(done, std::memory_order_release);
+    bells_.slam.ring();
+  }
+
+  [[nodiscard]] std::optional<Duration> time_to_deadline(HostTime now) const {
+    const auto deadline = synchroniser_.deadline();
+    return deadline ? std::optional{std::max(*deadline - now, Duration::zero())} : std::nullopt;
+  }
+
+  void forward(SyncedPacket packet) {
+    RunCounters& counters = run_.statistics->counters;
+    counters.packets.fetch_add(1, std::memory_order_relaxed);
+    packets_.push(std::move(packet));
+    counters.packets_dropped.store(packets_.dropped(), std::memory_order_relaxed);
+    bells_.slam.ring();
+  }
+
+  void slam(const std::stop_token& stop) {
+    bool done = false;
+    bool stopped = false;
+    while (!done && !stopped) {
+      done = packets_done_.load(std::memory_order_acquire);
+      if (const auto packet = packets_.try_pop()) {
+        done = false;
+        estimate(*packet);
+        stopped = stop.stop_requested();
+      } else if (!done) {
+        stopped = bells_.slam.wait() == Doorbell::Wake::kStopped;
+      }
+    }
+    if (!stopped) {
+      finish_mapping();
+      on_end_();
+    }
+  }
+
+  void estimate(const SyncedPacket& packet) {
+    take_over_mapping();
+    const PoseEstimate estimate = process_packet(run_, packet);
+    on_estimate_(packet, estimate);
+    run_.statistics->delivery.add(HostClock::now() - packet.t_arrival);
+    if (!mapping_) {
+      if (auto task = run_.core->take_mapping_task()) {
+        mapping_ = tasks_.try_push(std::move(*task));
+        bells_.map.ring();
+      }
+    }
+  }
+
+  void take_over_mapping() {
+    if (const auto result = results_.try_pop()) {
+      run_.core->apply(*result);
+      run_.statistics->counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
+      mapping_ = false;
+    }
+  }
+
+  /// At the source's end: what is still worked on goes into the final trajectory.
+  void finish_mapping() {
+    take_over_mapping();
+    while (mapping_ && bells_.slam.wait() != Doorbell::Wake::kStopped) {
+      take_over_mapping();
+    }
+  }
+
+  void map(const std::stop_token& stop) {
+    bool stopped = false;
+    while (!stopped) {
+      if (const auto task = tasks_.try_pop()) {
+        // One task is out at a time, so there is room for its result.
+        (void)results_.try_push(slam::optimise(*task, &run_.statistics->mapping));
+        bells_.slam.ring();
+        stopped = stop.stop_requested();
+      } else {
+        stopped = bells_.map.wait() == Doorbell::Wake::kStopped;
+      }
+    }
+  }
+
+  Run& run_;
+  EstimateHandler on_estimate_;
+  std::function<void()> on_end_;
+  Bells bells_;
+  SampleQueues queues_;
+  timesync::Synchroniser synchroniser_;                 // sync
+  timesync::DropOldestRing<SyncedPacket> packets_;      // sync -> slam
+  timesync::SpscRing<slam::MappingTask> tasks_{1};      // slam -> map
+  timesync::SpscRing<slam::MappingResult> results_{1};  // map -> slam
+  std::atomic<bool> source_done_{false};
+  std::atomic<bool> packets_done_{false};
+  bool mapping_ = false;  // slam: a task is with map
+  StartedPorts ports_;
+  std::jthread map_;
+  std::jthread slam_;
+  std::jthread sync_;
+  std::jthread replay_;
+};
+
+Pipeline::Pipeline(std::unique_ptr<Implementation> implementation)
+    : implementation_{std::move(implementation)} {}
+Pipeline::~Pipeline() = default;
+
+Result<std::unique_ptr<Pipeline>> Pipeline::start(Run& run, const Config& config,
+                                                  EstimateHandler on_estimate,
+                                                  std::function<void()> on_end) {
+  auto bells = Bells::create();
+  if (!bells) {
+    return tl::unexpected{std::move(bells.error())};
+  }
+  auto implementation = std::make_unique<Implementation>(run, config, std::move(on_estimate),
+                                                         std::move(on_end), std::move(*bells));
+  auto started = implementation->start();
+  if (!started) {
+    return tl::unexpected{std::move(started.error())};
+  }
+  // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
+  return std::unique_ptr<Pipeline>{new Pipeline{std::move(implementation)}};
+}
+
+void Pipeline::stop() {
+  implementation_->stop();
+}
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,52 @@
+#include "geoflow/daemon/run.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/slam/core.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+std::optional<std::filesystem::path> if_given(const std::filesystem::path& path) {
+  return path.empty() ? std::nullopt : std::optional{path};
+}
+
+drivers::RecordingOptions recording_options(const Config& config) {
+  return {.path = config.source.replay,
+          .calibration = if_given(config.source.calibration),
+          .topics = config.topics,
+          .faults = if_given(config.source.faults),
+          .fault_seed = config.source.fault_seed,
+          .color_as_gray = true};
+}
+
+}  // namespace
+
+Result<Run> open_run(const Config& config) {
+  if (config.source.replay.empty()) {
+    return fail(ErrorCode::kInvalidArgument, "source.replay: no recording is named (--replay DIR)");
+  }
+  Run run;
+  auto streams = drivers::RecordedStreams::open(recording_options(config));
+  if (!streams) {
+    return tl::unexpected{std::move(streams.error())};
+  }
+  run.streams = std::move(*streams);
+  run.statistics = std::make_unique<RunStatistics>();
+  auto core =
+      slam::Core::create(run.streams->calibration(), config.slam, &run.statistics->tracking);
+  if (!core) {
+    return tl::unexpected{std::move(core.error())};
+  }
+  run.core = std::move(*core);
+  return run;
+}
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,113 @@
+#include "protocol/control_request.hpp"
+
+#include <cmath>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "geoflow/hal/result.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kHighestRateHz = 1000;
+
+Result<json> parse_object(std::string_view line) {
+  if (line.size() > kLongestRequest) {
+    return fail(ErrorCode::kInvalidArgument, "a request has at most {} bytes", kLongestRequest);
+  }
+  bool too_deep = false;
+  const json::parser_callback_t limit = [&](int depth, json::parse_event_t /*event*/,
+                                            json& /*value*/) {
+    too_deep = too_deep || depth > kDeepestRequest;
+    return !too_deep;
+  };
+  json value = json::parse(line, limit, false);
+  if (too_deep) {
+    return fail(ErrorCode::kInvalidArgument, "a request nests at most {} deep", kDeepestRequest);
+  }
+  if (!value.is_object()) {
+    return fail(ErrorCode::kInvalidArgument, "a request is one JSON object on one line");
+  }
+  return value;
+}
+
+/// An error if the object has a key besides cmd, id and those allowed.
+Result<void> only_keys(const json& object, std::initializer_list<std::string_view> allowed) {
+  for (const auto& item : object.items()) {
+    const bool known = item.key() == "cmd" || item.key() == "id" ||
+                       std::find(allowed.begin(), allowed.end(), item.key()) != allowed.end();
+    if (!known) {
+      return fail(ErrorCode::kInvalidArgument, "unknown key \"{}\"", item.key());
+    }
+  }
+  return {};
+}
+
+Result<WatchRequest> parse_watch(const json& object) {
+  const auto stream = object.find("stream");
+  if (stream != object.end() && *stream != "pose") {
+    return fail(ErrorCode::kInvalidArgument, "stream: must be \"pose\"");
+  }
+  const auto rate = object.find("rate_hz");
+  if (rate == object.end()) {
+    return WatchRequest{};
+  }
+  const double rate_hz = rate->is_number() ? rate->get<double>() : -1.0;
+  if (!std::isfinite(rate_hz) || rate_hz < 0.0 || rate_hz > kHighestRateHz) {
+    return fail(ErrorCode::kInvalidArgument, "rate_hz: must be a number from 0 to {}",
+                kHighestRateHz);
+  }
+  return WatchRequest{.rate_hz = rate_hz};
+}
+
+Result<ControlRequest> parse_command(const json& object, const std::string& name) {
+  ControlRequest request{.command = HelpRequest{}, .name = name, .id = {}};
+  if (name == "watch") {
+    const auto watch = parse_watch(object);
+    if (!watch) {
+      return tl::unexpected{watch.error()};
+    }
+    request.command = *watch;
+  } else if (name == "status") {
+    request.command = StatusRequest{};
+  } else if (name == "unwatch") {
+    request.command = UnwatchRequest{};
+  } else if (name != "help") {
+    return fail(ErrorCode::kInvalidArgument, "cmd: must be one of help, status, watch, unwatch");
+  }
+  const auto checked =
+      name == "watch" ? only_keys(object, {"stream", "rate_hz"}) : only_keys(object, {});
+  if (!checked) {
+    return tl::unexpected{checked.error()};
+  }
+  return request;
+}
+
+}  // namespace
+
+Result<ControlRequest> parse_control_request(std::string_view line) {
+  const auto object = parse_object(line);
+  if (!object) {
+    return tl::unexpected{object.error()};
+  }
+  const auto cmd = object->find("cmd");
+  if (cmd == object->end() || !cmd->is_string()) {
+    return fail(ErrorCode::kInvalidArgument, "cmd: must be a string");
+  }
+  const auto id = object->find("id");
+  if (id != object->end() && !id->is_string() && !id->is_number_integer()) {
+    return fail(ErrorCode::kInvalidArgument, "id: must be a string or a whole number");
+  }
+  return parse_command(*object, cmd->get<std::string>()).map([&](ControlRequest request) {
+    request.id = id == object->end() ? json{} : *id;
+    return request;
+  });
+}
+
+}  // namespace geoflow::daemon

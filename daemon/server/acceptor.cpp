@@ -1,0 +1,85 @@
+#include "server/acceptor.hpp"
+
+#include <cerrno>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+
+#include "geoflow/hal/log.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/unique_fd.hpp"
+
+#include "server/event_loop.hpp"
+#include "server/listening_socket.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+constexpr int kAcceptsAtOnce = 16;
+constexpr int kSendBufferBytes = 8192;  // about 13 poses; the default holds 167
+
+UniqueFd open_spare() {
+  return UniqueFd{::open("/dev/null", O_RDONLY | O_CLOEXEC)};
+}
+
+Connection describe(UniqueFd fd) {
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  ::getsockopt(fd.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size);
+  return {.fd = std::move(fd), .pid = credentials.pid, .uid = credentials.uid};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Acceptor>> Acceptor::create(EventLoop& loop,
+                                                   const ListeningSocket::Options& options,
+                                                   Handler handler) {
+  auto socket = ListeningSocket::open(options);
+  if (!socket) {
+    return tl::unexpected{std::move(socket.error())};
+  }
+  // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
+  std::unique_ptr<Acceptor> acceptor{new Acceptor{loop, std::move(*socket), std::move(handler)}};
+  auto added = loop.add(acceptor->socket_.fd(), EPOLLIN,
+                        [self = acceptor.get()](std::uint32_t /*events*/) { self->accept_some(); });
+  if (!added) {
+    return tl::unexpected{std::move(added.error())};
+  }
+  return acceptor;
+}
+
+Acceptor::Acceptor(EventLoop& loop, ListeningSocket socket, Handler handler)
+    : loop_{loop}, socket_{std::move(socket)}, handler_{std::move(handler)}, spare_{open_spare()} {}
+
+Acceptor::~Acceptor() {
+  loop_.remove(socket_.fd());
+}
+
+void Acceptor::accept_some() {
+  for (int i = 0; i < kAcceptsAtOnce; ++i) {
+    UniqueFd fd{::accept4(socket_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
+    if (fd) {
+      handler_(describe(std::move(fd)));
+    } else if (errno == EMFILE || errno == ENFILE) {
+      shed_one();
+      return;
+    } else if (errno != EINTR && errno != ECONNABORTED) {
+      return;
+    }
+  }
+}
+
+void Acceptor::shed_one() {
+  log::warning("server", "out of file descriptors: a connection was closed");
+  spare_.reset();
+  UniqueFd refused{::accept4(socket_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
+  refused.reset();  // its number is the spare's again
+  spare_ = open_spare();
+}
+
+}  // namespace geoflow::daemon

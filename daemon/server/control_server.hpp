@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/hal/result.hpp"
+
+#include "server/acceptor.hpp"
+#include "server/control_connection.hpp"
+#include "server/event_loop.hpp"
+
+namespace geoflow::daemon {
+
+/// The control socket: JSON lines for people and scripts (docs/protocol.md). Thread-bound: the
+/// loop's.
+class ControlServer {
+ public:
+  /// Errors as ListeningSocket::open().
+  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> create(
+      EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status);
+  ControlServer(const ControlServer&) = delete;
+  ControlServer& operator=(const ControlServer&) = delete;
+  ~ControlServer();
+
+  /// Sends a pose to those who watch.
+  void publish(const geoflow_pose& pose);
+  /// Cuts off clients that read nothing for too long. To be called a few times a second.
+  void check_timeouts();
+
+  [[nodiscard]] std::size_t client_count() const noexcept { return clients_.size(); }
+
+ private:
+  ControlServer(EventLoop& loop, const SocketConfig& config,
+                ControlConnection::StatusProvider status);
+  void on_connection(Connection connection);
+  void on_ready(int fd, std::uint32_t events);
+  void close(int fd);
+
+  EventLoop& loop_;
+  SocketConfig config_;
+  ControlConnection::StatusProvider status_;
+  std::unique_ptr<Acceptor> acceptor_;
+  std::unordered_map<int, std::unique_ptr<ControlConnection>> clients_;
+};
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,152 @@
+#include "server/pose_connection.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+
+#include <sys/socket.h>
+
+#include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/records.hpp"
+#include "geoflow/hal/time.hpp"
+
+#include "server/acceptor.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+constexpr double kRequestsPerSecond = 50;
+constexpr double kRequestBurst = 100;
+constexpr int kReceivesAtOnce = 16;
+
+}  // namespace
+
+PoseConnection::PoseConnection(Connection connection, std::uint32_t id, HostTime now)
+    : connection_{std::move(connection)},
+      id_{id},
+      requests_{kRequestsPerSecond, kRequestBurst, now},
+      waiting_since_{now} {}
+
+PoseConnection::Outcome PoseConnection::receive(const geoflow_welcome& welcome, HostTime now) {
+  std::array<std::byte, GEOFLOW_MAX_RECORD> buffer{};
+  for (int i = 0; i < kReceivesAtOnce; ++i) {
+    // recv, not recvmsg: without a control buffer the kernel closes descriptors that a client
+    // passes.
+    const ssize_t size = ::recv(fd(), buffer.data(), buffer.size(), MSG_DONTWAIT | MSG_TRUNC);
+    if (size < 0) {
+      return errno == EAGAIN || errno == EINTR ? Outcome::kOpen : Outcome::kLost;
+    }
+    const auto length = static_cast<std::size_t>(size);
+    if (length == 0 || length > buffer.size() || !requests_.take(now)) {
+      return Outcome::kLost;
+    }
+    if (!welcomed_) {
+      const Outcome greeted = greet(std::span{buffer}.first(length), welcome);
+      if (greeted != Outcome::kOpen) {
+        return greeted;
+      }
+    }  // what a later minor version may say after HELLO is ignored
+  }
+  return Outcome::kOpen;
+}
+
+PoseConnection::Outcome PoseConnection::greet(std::span<const std::byte> datagram,
+                                              const geoflow_welcome& welcome) {
+  auto hello = parse_hello(datagram);
+  if (!hello) {
+    refuse(hello.error().reason, hello.error().text);
+    return Outcome::kLost;
+  }
+  name_ = std::move(hello->name);
+  wants_pose_ = hello->wants_pose;
+  rate_ = RateLimit{hello->max_rate_hz};
+  geoflow_welcome reply = welcome;
+  reply.client_id = id_;
+  welcomed_ = send(encode_record(GEOFLOW_WELCOME, 0, sent_, reply)) == Sent::kYes;
+  return welcomed_ ? Outcome::kOpen : Outcome::kLost;
+}
+
+void PoseConnection::refuse(geoflow_refusal reason, const std::string& text) {
+  geoflow_refuse record{};
+  record.reason = reason;
+  copy_text(record.text, text);
+  (void)send(encode_record(GEOFLOW_REFUSE, 0, sent_, record));
+  // Unread data at close() would turn the refusal into ECONNRESET at the client.
+  ::shutdown(fd(), SHUT_RD);
+  std::array<std::byte, GEOFLOW_MAX_RECORD> discarded{};
+  for (int i = 0;
+       i < kReceivesAtOnce && ::recv(fd(), discarded.data(), discarded.size(), MSG_DONTWAIT) > 0;
+       ++i) {
+  }
+}
+
+PoseConnection::Outcome PoseConnection::offer(const geoflow_pose& pose, HostTime now) {
+  if (!welcomed_ || !wants_pose_ || ending_ || !rate_.due(now)) {
+    return Outcome::kOpen;
+  }
+  if (pending_) {
+    ++dropped_;
+    ++dropped_since_last_;
+    pending_ = pose;
+    return Outcome::kOpen;
+  }
+  const Sent result = send_pose(pose);
+  if (result == Sent::kFull) {
+    pending_ = pose;
+    waiting_since_ = now;
+  }
+  return result == Sent::kBroken ? Outcome::kLost : Outcome::kOpen;
+}
+
+PoseConnection::Outcome PoseConnection::flush(HostTime now) {
+  if (pending_) {
+    const Sent result = send_pose(*pending_);
+    if (result != Sent::kYes) {
+      return result == Sent::kBroken ? Outcome::kLost : Outcome::kOpen;
+    }
+    pending_.reset();
+    waiting_since_ = now;
+  }
+  return ending_ ? send_end() : Outcome::kOpen;
+}
+
+PoseConnection::Outcome PoseConnection::finish(geoflow_end_reason reason, HostTime now) {
+  if (!welcomed_) {
+    return Outcome::kFinished;
+  }
+  if (!blocked()) {
+    waiting_since_ = now;
+  }
+  ending_ = reason;
+  return pending_ ? Outcome::kOpen : send_end();
+}
+
+PoseConnection::Outcome PoseConnection::send_end() {
+  const geoflow_end record{.reason = static_cast<std::uint32_t>(*ending_), .reserved = 0};
+  const Sent result = send(encode_record(GEOFLOW_END, 0, sent_, record));
+  ended_ = result == Sent::kYes;
+  return result == Sent::kFull ? Outcome::kOpen : Outcome::kFinished;
+}
+
+PoseConnection::Sent PoseConnection::send_pose(const geoflow_pose& pose) {
+  const Sent result = send(encode_record(GEOFLOW_POSE, dropped_since_last_, sent_, pose));
+  if (result == Sent::kYes) {
+    dropped_since_last_ = 0;
+  }
+  return result;
+}
+
+PoseConnection::Sent PoseConnection::send(std::span<const std::byte> record) {
+  const ssize_t size = ::send(fd(), record.data(), record.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (size >= 0) {
+    ++sent_;
+    return Sent::kYes;
+  }
+  return errno == EAGAIN || errno == EINTR ? Sent::kFull : Sent::kBroken;
+}
+
+}  // namespace geoflow::daemon

@@ -1,0 +1,200 @@
+#include "geoflow/daemon/daemon.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/version.hpp"
+#include "geoflow/hal/exit_code.hpp"
+#include "geoflow/hal/log.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/doorbell.hpp"
+
+#include "server/control_server.hpp"
+#include "server/event_loop.hpp"
+#include "server/pose_server.hpp"
+#include "src/signal_watch.hpp"
+#include "src/worker.hpp"
+
+namespace geoflow::daemon {
+namespace {
+
+constexpr auto kHousekeepingPeriod = std::chrono::milliseconds{100};
+constexpr auto kLastWords = std::chrono::seconds{1};  // that clients get to read the last pose
+
+/// The daemon's objects and how they are wired. All on one thread, the loop's.
+class Daemon {
+ public:
+  explicit Daemon(const Config& config, std::unique_ptr<EventLoop> loop, timesync::Doorbell bell)
+      : config_{config}, loop_{std::move(loop)}, bell_{std::move(bell)} {}
+
+  Result<void> start() {
+    return watch_signals()
+        .and_then([this] { return open_sockets(); })
+        .and_then([this] { return start_worker(); })
+        .and_then([this] {
+          return loop_->add(bell_.fd(), EPOLLIN, [this](std::uint32_t /*events*/) { on_bell(); });
+        })
+        .and_then(
+            [this] { return loop_->add_timer(kHousekeepingPeriod, [this] { keep_house(); }); });
+  }
+
+  Result<void> run() { return loop_->run(); }
+
+ private:
+  Result<void> watch_signals() {
+    auto watch = SignalWatch::create(*loop_, {SIGINT, SIGTERM, SIGHUP},
+                                     [this](int signal) { on_signal(signal); });
+    return std::move(watch).map([this](auto made) { signals_ = std::move(made); });
+  }
+
+  Result<void> open_sockets() {
+    if (!config_.socket.pose.empty()) {
+      auto server = PoseServer::create(*loop_, config_.socket, Worker::clock_flags(config_.source));
+      if (!server) {
+        return tl::unexpected{std::move(server.error())};
+      }
+      poses_ = std::move(*server);
+    }
+    if (!config_.socket.control.empty()) {
+      auto server = ControlServer::create(*loop_, config_.socket, [this] { return status(); });
+      if (!server) {
+        return tl::unexpected{std::move(server.error())};
+      }
+      control_ = std::move(*server);
+    }
+    return {};
+  }
+
+  Result<void> start_worker() {
+    auto worker = Worker::start(config_, bell_, resets_);
+    return std::move(worker).map([this](auto made) { worker_ = std::move(made); });
+  }
+
+  void on_bell() {
+    bell_.clear();
+    const bool ended = worker_->ended();  // before the pose is taken, which then is the last
+    if (const auto pose = worker_->take_pose()) {
+      resets_ = pose->reset_counter;
+      publish(*pose);
+    }
+    if (ended && !leaving_) {
+      config_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
+    }
+  }
+
+  void publish(const geoflow_pose& pose) {
+    if (poses_) {
+      poses_->publish(pose);
+    }
+    if (control_) {
+      control_->publish(pose);
+    }
+  }
+
+  void on_signal(int signal) {
+    if (signal == SIGHUP) {
+      log::info("daemon", "SIGHUP: the configuration is read at start only");
+      return;
+    }
+    log::info("daemon", "stopping on signal {}", signal);
+    worker_->stop();
+    leave(GEOFLOW_END_STOPPED);
+  }
+
+  void restart() {
+    ++resets_;
+    worker_.reset();
+    auto started = start_worker();
+    if (!started) {
+      failure_ = std::move(started.error());
+      loop_->stop();
+    }
+  }
+
+  /// Says goodbye and ends once every client has heard it, or after kLastWords.
+  void leave(geoflow_end_reason reason) {
+    leaving_ = HostClock::now();
+    if (poses_) {
+      poses_->finish(reason);
+    }
+    keep_house();
+  }
+
+  void keep_house() {
+    if (poses_) {
+      poses_->check_timeouts();
+    }
+    if (control_) {
+      control_->check_timeouts();
+    }
+    const bool heard = !poses_ || poses_->client_count() == 0;
+    if (leaving_ && (heard || HostClock::now() - *leaving_ > kLastWords)) {
+      loop_->stop();
+    }
+  }
+
+  nlohmann::json status() const {
+    nlohmann::json status = worker_ ? worker_->status() : nlohmann::json::object();
+    status["version"] = std::string{version()};
+    status["pid"] = ::getpid();
+    status["uptime_s"] = to_seconds(HostClock::now() - began_);
+    status["peak_memory_mib"] = peak_memory_mib();
+    status["pose_socket"] = poses_ ? poses_->status() : nlohmann::json{};
+    status["control_clients"] = control_->client_count();
+    return status;
+  }
+
+ public:
+  /// What ended the loop, if it was a failure.
+  [[nodiscard]] const std::optional<Error>& failure() const noexcept { return failure_; }
+
+ private:
+  const Config& config_;
+  HostTime began_ = HostClock::now();
+  std::unique_ptr<EventLoop> loop_;
+  timesync::Doorbell bell_;  // from the worker's threads
+  std::unique_ptr<SignalWatch> signals_;
+  std::unique_ptr<PoseServer> poses_;
+  std::unique_ptr<ControlServer> control_;
+  std::uint32_t resets_ = 0;
+  std::unique_ptr<Worker> worker_;
+  std::optional<HostTime> leaving_;
+  std::optional<Error> failure_;
+};
+
+}  // namespace
+
+Result<ExitCode> run_daemon(const Config& config) {
+  auto loop = EventLoop::create();
+  if (!loop) {
+    return tl::unexpected{std::move(loop.error())};
+  }
+  auto bell = timesync::Doorbell::create();
+  if (!bell) {
+    return tl::unexpected{std::move(bell.error())};
+  }
+  Daemon daemon{config, std::move(*loop), std::move(*bell)};
+  auto done = daemon.start().and_then([&] { return daemon.run(); });
+  if (!done) {
+    return tl::unexpected{std::move(done.error())};
+  }
+  if (daemon.failure()) {
+    return tl::unexpected{*daemon.failure()};
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace geoflow::daemon

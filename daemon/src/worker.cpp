@@ -1,0 +1,115 @@
+#include "src/worker.hpp"
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <pthread.h>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/lock_step_runner.hpp"
+#include "geoflow/daemon/pipeline.hpp"
+#include "geoflow/daemon/records.hpp"
+#include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/hal/log.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/doorbell.hpp"
+
+namespace geoflow::daemon {
+
+Worker::Worker(const Config& config, timesync::Doorbell& bell, std::uint32_t earlier_resets,
+               Run run)
+    : config_{config}, bell_{bell}, earlier_resets_{earlier_resets}, run_{std::move(run)} {}
+
+Result<std::unique_ptr<Worker>> Worker::start(const Config& config, timesync::Doorbell& bell,
+                                              std::uint32_t earlier_resets) {
+  auto run = open_run(config);
+  if (!run) {
+    return tl::unexpected{std::move(run.error())};
+  }
+  // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
+  std::unique_ptr<Worker> worker{new Worker{config, bell, earlier_resets, std::move(*run)}};
+  auto launched = worker->launch();
+  if (!launched) {
+    return tl::unexpected{std::move(launched.error())};
+  }
+  return worker;
+}
+
+Result<void> Worker::launch() {
+  const EstimateHandler on_estimate = [this](const SyncedPacket& packet,
+                                             const PoseEstimate& estimate) {
+    publish(packet, estimate);
+  };
+  if (config_.source.realtime) {
+    auto pipeline = Pipeline::start(run_, config_, on_estimate, [this] { end(); });
+    if (!pipeline) {
+      return tl::unexpected{std::move(pipeline.error())};
+    }
+    pipeline_ = std::move(*pipeline);
+    return {};
+  }
+  lock_step_ = std::jthread{[this, on_estimate](const std::stop_token& stop) {
+    ::pthread_setname_np(::pthread_self(), "slam");
+    const auto done = LockStepRunner{run_, config_, on_estimate}.run(stop);
+    if (!done) {
+      log::error("replay", "{}", done.error().message);
+    }
+    if (!stop.stop_requested()) {
+      end();
+    }
+  }};
+  return {};
+}
+
+void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
+  const RunCounters& counters = run_.statistics->counters;
+  const PoseContext context{
+      .t_publish = HostClock::now(),
+      .t_recording = run_.streams->to_recording_time(estimate.t),
+      .clock_flags = clock_flags(config_.source),
+      .earlier_resets = earlier_resets_,
+      .frames_dropped = counters.color_dropped.load(std::memory_order_relaxed) +
+                        counters.packets_dropped.load(std::memory_order_relaxed)};
+  newest_.store(make_pose(packet, estimate, context));
+  bell_.ring();
+}
+
+void Worker::end() {
+  ended_.store(true, std::memory_order_release);
+  bell_.ring();
+}
+
+void Worker::stop() {
+  pipeline_.reset();
+  if (lock_step_.joinable()) {
+    lock_step_.request_stop();
+    lock_step_.join();
+  }
+}
+
+nlohmann::json Worker::status() const {
+  nlohmann::json status = to_json(*run_.statistics);
+  status["source"] = {{"path", config_.source.replay.string()},
+                      {"format", run_.streams->info().format},
+                      {"calibration", run_.streams->calibration().source},
+                      {"realtime", config_.source.realtime}};
+  return status;
+}
+
+std::uint32_t Worker::clock_flags(const SourceConfig& source) noexcept {
+  return source.realtime ? std::uint32_t{GEOFLOW_CLOCK_REPLAY}
+                         : GEOFLOW_CLOCK_REPLAY | GEOFLOW_CLOCK_UNPACED;
+}
+
+}  // namespace geoflow::daemon

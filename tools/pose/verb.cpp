@@ -1,0 +1,167 @@
+#include "geoflow/tools/verb.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include <CLI/App.hpp>
+#include <CLI/Validators.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/pose_client.hpp"
+#include "geoflow/daemon/records.hpp"
+#include "geoflow/hal/exit_code.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/console.hpp"
+#include "geoflow/tools/interrupt.hpp"
+
+namespace geoflow::tools {
+namespace {
+
+using daemon::PoseClient;
+using daemon::ReceivedPose;
+
+constexpr auto kWaitSlice = std::chrono::milliseconds{200};
+constexpr double kHighestRateHz = 1000;
+constexpr double kMillisecondsPerNanosecond = 1e-6;
+constexpr double kDegreesPerRadian = 57.29577951308232;
+
+/// T_map_base as p and q of the record's two transforms.
+SE3 map_from_base(const geoflow_pose& pose) {
+  const auto transform = [](const double* q, const double* p) {
+    return SE3{Eigen::Quaterniond{q[3], q[0], q[1], q[2]}, Vector3d{p[0], p[1], p[2]}};
+  };
+  const SE3 T_map_odom = transform(&pose.q_map_odom[0], &pose.p_map_odom[0]);
+  const SE3 T_odom_base = transform(&pose.q_odom_base[0], &pose.p_odom_base[0]);
+  return T_map_odom * T_odom_base;
+}
+
+/// Standard deviation of the position: the root of the covariance's first three diagonal elements.
+double position_sigma_m(const geoflow_pose& pose) {
+  constexpr std::size_t kXx = 0;
+  constexpr std::size_t kYy = 6;
+  constexpr std::size_t kZz = 11;
+  return std::sqrt(pose.covariance[kXx] + pose.covariance[kYy] + pose.covariance[kZz]);
+}
+
+std::string text_line(const ReceivedPose& received) {
+  const geoflow_pose& pose = received.pose;
+  const SE3 T_map_base = map_from_base(pose);
+  const Vector3d& p = T_map_base.translation();
+  const Matrix3d R = T_map_base.rotation_matrix();
+  const double yaw_deg = std::atan2(R(1, 0), R(0, 0)) * kDegreesPerRadian;
+  const auto status = static_cast<TrackingStatus>(pose.status);
+  std::string line = fmt::format(
+      "{:.3f} {:12} x {:8.3f} y {:8.3f} z {:8.3f} m  yaw {:7.2f} deg  sigma {:.3f} m  quality {:3}",
+      to_seconds(Duration{pose.t_recording_ns}), to_string(status), p.x(), p.y(), p.z(), yaw_deg,
+      position_sigma_m(pose), pose.quality);
+  if ((pose.clock_flags & GEOFLOW_CLOCK_UNPACED) == 0) {
+    const auto latency_ns =
+        static_cast<double>(received.t_received.time_since_epoch().count() - pose.t_arrival_ns);
+    line += fmt::format("  latency {:.1f} ms", latency_ns * kMillisecondsPerNanosecond);
+  }
+  if (received.dropped > 0) {
+    line += fmt::format("  missed {}", received.dropped);
+  }
+  return line;
+}
+
+nlohmann::json json_line(const ReceivedPose& received) {
+  nlohmann::json line = daemon::pose_to_json(received.pose);
+  line["dropped"] = received.dropped;
+  line["t_received_ns"] = received.t_received.time_since_epoch().count();
+  return line;
+}
+
+class PoseVerb final : public Verb {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "pose"; }
+  [[nodiscard]] std::string_view summary() const override {
+    return "Show the live pose from the daemon's socket";
+  }
+  [[nodiscard]] std::string_view examples() const override {
+    return "  geoflow pose                              every pose, one a line, until the daemon "
+           "ends or Ctrl-C\n"
+           "  geoflow pose --once --json                the newest pose as one JSON object\n"
+           "  geoflow pose --rate 2                     two a second\n"
+           "  geoflow pose --json | jq .p_odom_base     for scripts\n"
+           "Any number of them may run at once. The keys of the JSON: docs/protocol.md.";
+  }
+
+  void declare(CLI::App& command) override {
+    command.add_option("--socket", socket_, "The daemon's pose socket")->capture_default_str();
+    command.add_option("--rate", rate_hz_, "Poses a second at most; 0: every one")
+        ->check(CLI::Range(0.0, kHighestRateHz))
+        ->capture_default_str();
+    command.add_option("--count", count_, "End after so many poses; 0: do not");
+    command.add_flag("--once", once_, "End after one pose");
+  }
+
+  [[nodiscard]] Result<ExitCode> run(Console& console) override {
+    auto client = PoseClient::connect(socket_, {.name = "geoflow pose", .max_rate_hz = rate_hz_});
+    if (!client) {
+      return tl::unexpected{std::move(client.error())};
+    }
+    const InterruptScope interrupt;
+    const std::uint64_t wanted = once_ ? 1 : count_;
+    std::uint64_t shown = 0;
+    while (!InterruptScope::requested()) {
+      auto received = client->receive(kWaitSlice);
+      if (!received) {
+        return tl::unexpected{std::move(received.error())};
+      }
+      if (const auto* ended = std::get_if<PoseClient::Ended>(&*received)) {
+        return end(*ended, shown);
+      }
+      if (const auto* pose = std::get_if<ReceivedPose>(&*received)) {
+        show(*pose, console);
+        if (++shown == wanted) {
+          break;
+        }
+      }
+    }
+    return ExitCode::kOk;
+  }
+
+ private:
+  [[nodiscard]] static Result<ExitCode> end(const PoseClient::Ended& ended, std::uint64_t shown) {
+    if (ended.reason == 0 || shown == 0) {
+      return fail(ErrorCode::kUnavailable, "the daemon {}",
+                  ended.reason == 0 ? "has gone" : "ended before any pose");
+    }
+    return ExitCode::kOk;
+  }
+
+  static void show(const ReceivedPose& received, Console& console) {
+    if (console.json()) {
+      console.object(json_line(received));
+    } else {
+      console.line("{}", text_line(received));
+    }
+  }
+
+  std::string socket_ = daemon::SocketConfig{}.pose.string();
+  double rate_hz_ = 0;
+  std::uint64_t count_ = 0;
+  bool once_ = false;
+};
+
+}  // namespace
+
+// NOLINTNEXTLINE(misc-use-internal-linkage): called by the generated list of verbs
+std::unique_ptr<Verb> make_pose_verb() {
+  return std::make_unique<PoseVerb>();
+}
+
+}  // namespace geoflow::tools
