@@ -68,6 +68,17 @@ INSTANTIATE_TEST_SUITE_P(
         BadScript{"[[fault]]\nkind = 'clock_wrap'\nstream = 'imu'\nfirst_wrap_s = 5000\n",
                   "f.toml:4: first_wrap_s", "4294.967"}));
 
+TEST(FaultScript, RefusesWhatItsParserWouldTripOver) {
+  for (const char* header : {"[", "[[", "[\x05", "[!]", "[[ !", "[\n", "[[[a]]]", "[]",
+                             "k_i\xcb\x8c", "[\xc2\xa0!", "a\f[!"}) {
+    EXPECT_THAT(message_of(faults::parse_script("f", std::string{"# [!] is a comment\n"} + header)),
+                HasSubstr("f:2: not TOML"))
+        << header;
+  }
+  EXPECT_TRUE(faults::parse_script(
+      "f", "# [!] is a comment\n[[ fault ]]\nkind = 'drop'\nstream = 'imu'\n"));
+}
+
 TEST(FaultScript, AllowsAtMost64Faults) {
   std::string script;
   for (int i = 0; i < 65; ++i) {
