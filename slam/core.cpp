@@ -21,6 +21,16 @@
 #include "odometry/tracker.hpp"
 
 namespace geoflow::slam {
+namespace {
+
+/// Shares of a frame's depth that have to agree with the map to be a fix by themselves.
+constexpr double kDepthCarriesOn = 0.5;
+constexpr double kDepthBegins = 0.7;
+/// A frame that follows from the one before but has not been found in the map for so long begins a
+/// new part of it, tied to the old one by nothing but what was dead-reckoned in between.
+constexpr int kLostFrames = 15;
+
+}  // namespace
 
 class Core::Impl {
  public:
@@ -93,9 +103,12 @@ class Core::Impl {
   PoseEstimate follow(const SyncedPacket& packet) {
     const TrackingResult result = tracker_.track(map_, motion_);
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
-    // Depth alone carries a track on but begins none: what looks alike in depth may be elsewhere.
-    const bool fixed =
-        result.visual_fix || (result.depth_fix && last_.status == TrackingStatus::kTracking);
+    // Depth alone may look alike elsewhere, so to begin a track it has to fit better than to carry
+    // one on.
+    const double enough_depth =
+        last_.status == TrackingStatus::kTracking ? kDepthCarriesOn : kDepthBegins;
+    const bool depth_fix = result.depth_share > enough_depth;
+    const bool fixed = result.visual_fix || depth_fix;
     motion_.update(packet.t, T_odom_cam, fixed);
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
@@ -108,9 +121,16 @@ class Core::Impl {
     estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
     estimate.quality = quality(result);
 
-    if (fixed && needs_keyframe(packet, result, T_odom_cam)) {
+    frames_lost_ = fixed ? 0 : frames_lost_ + 1;
+    const bool begin_anew = frames_lost_ > kLostFrames && result.sure;
+    if (begin_anew) {
+      ++reset_counter_;
+      frames_lost_ = 0;
+    }
+    if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       insert_keyframe(covariance);
     }
+    estimate.reset_counter = reset_counter_;
     records_.push_back(
         {packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam});
     last_ = estimate;
@@ -158,7 +178,7 @@ class Core::Impl {
     constexpr double kPlentyOfPoints = 100;
     constexpr double kFull = 100;
     const double visual = std::min(1.0, result.solution.visual_inliers / kPlentyOfPoints);
-    const double depth = result.depth_fix ? result.overlap : 0;
+    const double depth = result.depth_share > kDepthCarriesOn ? result.overlap : 0;
     return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
   }
 
@@ -171,7 +191,7 @@ class Core::Impl {
     return moved.tail<3>().norm() > config_.keyframes.translation_m ||
            moved.head<3>().norm() > config_.keyframes.rotation_rad ||
            share < config_.keyframes.overlap / 2 ||
-           (result.depth_fix && result.overlap < config_.keyframes.overlap) ||
+           (result.depth_share > kDepthCarriesOn && result.overlap < config_.keyframes.overlap) ||
            packet.t - reference.t > config_.keyframes.maximum_interval;
   }
 
@@ -195,6 +215,8 @@ class Core::Impl {
   std::optional<KeyframeId> pending_;
   std::vector<FrameRecord> records_;
   PoseEstimate last_;
+  int frames_lost_ = 0;
+  std::uint32_t reset_counter_ = 0;
   StageObserver* observer_;
 };
 

@@ -19,8 +19,46 @@ namespace {
 
 constexpr std::size_t kRelocationKeyframes =
     30;  ///< newest keyframes that a lost frame is compared with
+/// Two views whose depth agrees in this share of the surfels are of one place.
+constexpr double kFits = 0.7;
+/// A place found by descriptors is believed when its depth agrees in this share: a wrong one agrees
+/// in few surfels.
+constexpr double kSamePlace = 0.3;
 /// A frame is registered to keyframes that see at least this share of its depth.
 constexpr double kTargetOverlap = 0.5;
+
+/// Where nothing is known of the pose, many features make up for the few that two views have in
+/// common.
+FeatureConfig dense(FeatureConfig config) {
+  constexpr int kTimes = 4;
+  config.features_per_cell *= kTimes;
+  return config;
+}
+
+/// Registration from a guess that may be far off, as after a gap: besides the guess, no motion at
+/// all, and, unless one of these fits well, motions around that in every direction. The one that
+/// fits most of the surfels is taken.
+RegistrationResult register_from_afar(const DepthCloud& source, const DepthCloud& target,
+                                      const SE3& T_target_source_guess, const GicpConfig& config) {
+  constexpr double kStepM = 0.2;
+  constexpr double kStepRad = 0.15;
+  RegistrationResult best = register_clouds(source, target, T_target_source_guess, config);
+  const auto attempt = [&](const SE3& guess) {
+    if (best.overlap < kFits || !best.converged) {
+      const RegistrationResult result = register_clouds(source, target, guess, config);
+      if (result.converged && (!best.converged || result.overlap > best.overlap)) {
+        best = result;
+      }
+    }
+  };
+  attempt(SE3{});
+  for (int axis = 0; axis < 6; ++axis) {
+    const double step = axis < 3 ? kStepRad : kStepM;
+    attempt(SE3::exp(step * Vector6d::Unit(axis)));
+    attempt(SE3::exp(-step * Vector6d::Unit(axis)));
+  }
+  return best;
+}
 
 }  // namespace
 
@@ -33,6 +71,7 @@ Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration
       flow_{config.flow, camera_},
       optimiser_{config.pose, config.mapping, gicp, camera_},
       orb_{config.features},
+      dense_orb_{dense(config.features)},
       grid_{std::move(grid)},
       observer_{observer} {}
 
@@ -111,8 +150,17 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
   }
 }
 
+bool Tracker::agrees_in_depth(const Map& map, KeyframeId keyframe, const SE3& T_odom_cam) const {
+  if (!current_.cloud) {
+    return true;
+  }
+  const auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kSamePlace);
+  return std::any_of(overlapping.begin(), overlapping.end(),
+                     [&](const OverlappingKeyframe& k) { return k.id == keyframe; });
+}
+
 std::optional<SE3> Tracker::relocate(const Map& map) {
-  const std::vector<OrbFeature> found = orb_.extract(current_.pyramid.image(), {});
+  const std::vector<OrbFeature> found = dense_orb_.extract(current_.pyramid.image(), {});
   const double anywhere = camera_.intrinsics().width + camera_.intrinsics().height;
   const Vector2d middle{camera_.intrinsics().cx, camera_.intrinsics().cy};
   std::optional<SE3> best;
@@ -135,8 +183,10 @@ std::optional<SE3> Tracker::relocate(const Map& map) {
         matches.push_back({map.find_point(*feature.point)->p_odom, feature.ideal, feature.depth_m});
       }
     }
-    const std::optional<PnpSolution> solution = solve_pnp(matches, camera_, config_.pose);
-    if (solution && solution->inliers > most) {
+    const std::optional<PnpSolution> solution =
+        solve_pnp(matches, camera_, config_.pose, kPnpOnDescriptors);
+    if (solution && solution->inliers > most &&
+        agrees_in_depth(map, keyframe->first, solution->T_odom_cam)) {
       most = solution->inliers;
       best = solution->T_odom_cam;
       current_.features = std::move(features);
@@ -159,24 +209,22 @@ std::vector<VisualMatch> Tracker::matches(const Map& map,
   return found;
 }
 
-SE3 Tracker::initial_pose(const Map& map, const SE3& predicted,
-                          std::span<const VisualMatch> matches, PoseSource& source) {
+Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
+                                           std::span<const VisualMatch> matches) const {
   const StageScope scope{observer_, Stage::kPoseInitialisation};
-  if (const std::optional<PnpSolution> pose = solve_pnp(matches, camera_, config_.pose)) {
-    source = PoseSource::kPnp;
-    return pose->T_odom_cam;
+  if (const std::optional<PnpSolution> pose =
+          solve_pnp(matches, camera_, config_.pose, kPnpOnTracks)) {
+    return {pose->T_odom_cam, PoseSource::kPnp, true};
   }
-  if (config_.switches.gicp && current_.cloud && previous_.cloud && !map.keyframes().empty()) {
-    const RegistrationResult registration = register_clouds(
-        *current_.cloud, *previous_.cloud, previous_.T_odom_cam.inverse() * predicted, gicp_);
-    if (registration.converged) {
-      source = PoseSource::kGicp;
-      const SE3& T_odom_target = previous_.T_odom_cam;
-      return T_odom_target * registration.T_target_source;
+  if (config_.switches.gicp && current_.cloud && previous_.cloud) {
+    const SE3& T_odom_previous = previous_.T_odom_cam;
+    const RegistrationResult found = register_from_afar(
+        *current_.cloud, *previous_.cloud, T_odom_previous.inverse() * predicted, gicp_);
+    if (found.converged) {
+      return {T_odom_previous * found.T_target_source, PoseSource::kGicp, found.overlap > kFits};
     }
   }
-  source = PoseSource::kConstantVelocity;
-  return predicted;
+  return {predicted, PoseSource::kConstantVelocity, false};
 }
 
 void Tracker::keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
@@ -211,21 +259,22 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   }
   std::vector<std::size_t> feature_of_match;
   std::vector<VisualMatch> visual = matches(map, feature_of_match);
-  SE3 start = initial_pose(map, prior.T_odom_cam, visual, result.source);
-
-  if (result.source != PoseSource::kPnp) {
+  InitialPose initial = initial_pose(prior.T_odom_cam, visual);
+  if (!initial.sure) {
     if (const std::optional<SE3> pose = relocate(map)) {
-      result.source = PoseSource::kPnp;
-      start = *pose;
+      initial = {*pose, PoseSource::kPnp, true};
       feature_of_match.clear();
       visual = matches(map, feature_of_match);
     }
   }
+  result.source = initial.source;
+  result.sure = initial.sure;
 
   const StageScope scope{observer_, Stage::kPoseOptimisation};
   std::vector<KeyframeId> targets;
   if (current_.cloud) {
-    const auto overlapping = overlapping_keyframes(map, *current_.cloud, start, kTargetOverlap);
+    const auto overlapping =
+        overlapping_keyframes(map, *current_.cloud, initial.T_odom_cam, kTargetOverlap);
     result.overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
     targets =
         registration_targets(overlapping, static_cast<std::size_t>(config_.pose.gicp_targets));
@@ -238,12 +287,13 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   }
   result.solution = optimiser_.solve(
       {.matches = visual, .cloud = current_.cloud.get(), .targets = depth_targets, .prior = prior},
-      start);
+      initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);
   result.visual_fix = result.solution.visual_inliers >= enough;
-  result.depth_fix = 2 * result.solution.depth_inliers > result.solution.depth_surfels;
+  result.depth_share = static_cast<double>(result.solution.depth_inliers) /
+                       std::max(1.0, static_cast<double>(result.solution.depth_surfels));
   return result;
 }
 

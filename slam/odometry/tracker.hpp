@@ -25,7 +25,8 @@ struct TrackingResult {
   PoseSolution solution;
   PoseSource source = PoseSource::kNone;
   bool visual_fix = false;  ///< enough map points agree with the pose
-  bool depth_fix = false;   ///< enough of the depth agrees, in all six directions
+  bool sure = false;        ///< the first guess was checked by enough of what it was made from
+  double depth_share = 0;   ///< share of the frame's depth that agrees with the map, 0 to 1
   double overlap = 0;  ///< largest share of the frame's depth that one keyframe sees too, 0 to 1
 };
 
@@ -46,15 +47,22 @@ class Tracker {
   [[nodiscard]] const Frame& current() const noexcept { return current_; }
 
  private:
+  struct InitialPose {
+    SE3 T_odom_cam;
+    PoseSource source;
+    bool sure;  ///< checked by enough of what it was made from
+  };
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
   /// Looks for the current frame in the newest keyframes by descriptors alone: needs no prediction.
   /// On success the frame's features are the matches.
   [[nodiscard]] std::optional<SE3> relocate(const Map& map);
+  [[nodiscard]] bool agrees_in_depth(const Map& map, KeyframeId keyframe,
+                                     const SE3& T_odom_cam) const;
   [[nodiscard]] std::vector<VisualMatch> matches(const Map& map,
                                                  std::vector<std::size_t>& feature_of_match) const;
-  [[nodiscard]] SE3 initial_pose(const Map& map, const SE3& predicted,
-                                 std::span<const VisualMatch> matches, PoseSource& source);
+  [[nodiscard]] InitialPose initial_pose(const SE3& predicted,
+                                         std::span<const VisualMatch> matches) const;
   void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
                     const PoseSolution& solution);
   [[nodiscard]] Feature feature_at(const Vector2d& raw) const;
@@ -66,6 +74,7 @@ class Tracker {
   DualStreamFlow flow_;
   PoseOptimiser optimiser_;
   OrbExtractor orb_;
+  OrbExtractor dense_orb_;
   std::shared_ptr<const CellGrid> grid_;
   StageObserver* observer_;
   Frame previous_;

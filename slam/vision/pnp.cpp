@@ -15,10 +15,9 @@
 namespace geoflow::slam {
 
 std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
-                                     const CameraModel& camera, const PoseConfig& config) {
-  constexpr int kIterations = 100;
+                                     const CameraModel& camera, const PoseConfig& config,
+                                     const PnpEffort& effort) {
   constexpr double kConfidence = 0.99;
-  constexpr double kLeastInlierShare = 0.5;
   if (matches.size() < static_cast<std::size_t>(config.minimum_visual_inliers)) {
     return std::nullopt;
   }
@@ -34,11 +33,12 @@ std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
   cv::Vec3d translation;
   std::vector<int> inliers;
   const bool found = cv::solvePnPRansac(
-      points, pixels, K, cv::noArray(), rotation, translation, false, kIterations,
+      points, pixels, K, cv::noArray(), rotation, translation, false, effort.iterations,
       static_cast<float>(config.pnp_threshold_px), kConfidence, inliers, cv::SOLVEPNP_P3P);
   const auto enough = static_cast<double>(config.minimum_visual_inliers);
   const auto count = static_cast<double>(inliers.size());
-  if (!found || count < enough || count < kLeastInlierShare * static_cast<double>(matches.size())) {
+  if (!found || count < enough ||
+      count < effort.least_inlier_share * static_cast<double>(matches.size())) {
     return std::nullopt;
   }
   const SE3 T_cam_odom{so3::exp({rotation[0], rotation[1], rotation[2]}),

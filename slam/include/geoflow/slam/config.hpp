@@ -39,7 +39,7 @@ struct PoseConfig {
   double pnp_threshold_px = 3.0;    ///< RANSAC inlier distance [px]
   int gicp_targets = 3;             ///< keyframes that a frame's depth is registered to at once
   int gicp_surfels = 1200;          ///< of a frame's depth, chosen for a well-conditioned pose
-  int iterations = 8;               ///< Gauss-Newton steps at most
+  int iterations = 5;               ///< Gauss-Newton steps at most
 };
 
 struct KeyframeConfig {
