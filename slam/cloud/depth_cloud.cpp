@@ -2,9 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/result.hpp"
+
+#include "cloud/cell_grid.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -12,6 +21,13 @@ namespace {
 /// What is summed over the rows of a cell, for each image column. q: inverse depth less the
 /// column's reference; v: row less the cell's middle row; only pixels with depth count.
 enum Column : std::size_t { kReference, kCount, kV, kVV, kQ, kQV, kQQ, kMask, kRowQ, kColumnSums };
+
+/// A square of side s has variance s^2 / 12 about its middle.
+constexpr double kSquareVariance = 12.0;
+constexpr double kDegree = std::numbers::pi / 180.0;
+/// Least determinant of a cell's pixels' scatter, relative to its diagonal.
+constexpr double kMinPixelSpread = 1e-3;
+constexpr double kPlaneParameters = 3.0;
 
 /// A neighbour belongs to a cell's surface when it is within this many sigmas of a pixel from the
 /// cell's own plane, whose slope is uncertain; the joint fit decides.
@@ -110,9 +126,9 @@ struct PlaneFit {
 
 /// The same sums over one cell, with u: column less the cell's middle column.
 struct DepthCloud::Sums {
-  double reference = 0;
-  double n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0;
-  double q = 0, qu = 0, qv = 0, qq = 0;
+  float reference = 0;
+  float n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0;
+  float q = 0, qu = 0, qv = 0, qq = 0;
 };
 
 DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m,
@@ -120,10 +136,10 @@ DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m
     : grid_{std::move(grid)},
       config_{config},
       unit_m_{static_cast<float>(depth_unit_m)},
-      tangent_scale_{static_cast<float>(grid_->cell_px() * grid_->cell_px() /
-                                        (12.0 * grid_->camera().fx * grid_->camera().fy))},
-      min_cosine_{
-          static_cast<float>(std::cos(config.max_incidence_deg * std::numbers::pi / 180.0))} {
+      tangent_scale_{
+          static_cast<float>(grid_->cell_px() * grid_->cell_px() /
+                             (kSquareVariance * grid_->camera().fx * grid_->camera().fy))},
+      min_cosine_{static_cast<float>(std::cos(config.max_incidence_deg * kDegree))} {
   config_.cell_px = grid_->cell_px();
   surfels_.resize(grid_->size());
   valid_.reserve(grid_->size());
@@ -133,12 +149,13 @@ DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m
 
 Result<void> DepthCloud::build(const FrameRef& depth) {
   valid_.clear();
-  std::fill(surfels_.begin(), surfels_.end(), Surfel{});
+  std::ranges::fill(surfels_, Surfel{});
   const CameraIntrinsics& camera = grid_->camera();
   if (!depth) {
     return fail(ErrorCode::kInvalidArgument, "depth cloud: no image");
   }
-  if (depth.shape() != ImageShape{camera.width, camera.height, PixelFormat::kDepth16}) {
+  if (depth.shape() !=
+      ImageShape{.width = camera.width, .height = camera.height, .format = PixelFormat::kDepth16}) {
     return fail(ErrorCode::kInvalidArgument,
                 "depth cloud: an image of {} x {} px is not the camera's 16-bit depth of {} x {}",
                 depth.shape().width, depth.shape().height, camera.width, camera.height);
@@ -161,7 +178,7 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
   const int px = grid_->cell_px();
   const std::size_t width =
       static_cast<std::size_t>(grid_->columns()) * static_cast<std::size_t>(px);
-  std::fill(columns_.begin(), columns_.end(), 0.0F);
+  std::ranges::fill(columns_, 0.0F);
   float* const reference = columns_.data() + kReference * width;
   float* const count = columns_.data() + kCount * width;
   float* const sum_v = columns_.data() + kV * width;
@@ -177,7 +194,9 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
     return static_cast<std::int32_t>(
         std::clamp(depth_m * static_cast<double>(to_counts), 1.0, kMost));
   };
-  const DepthLimits limits{to_int(config_.min_depth_m), to_int(config_.max_depth_m), to_counts};
+  const DepthLimits limits{.min = to_int(config_.min_depth_m),
+                           .max = to_int(config_.max_depth_m),
+                           .per_inverse_metre = to_counts};
 
   // A reference near the cell's own inverse depth keeps the squares' digits in single precision.
   const auto* const middle = depth.row<std::uint16_t>(cell_row * px + px / 2);
@@ -206,57 +225,49 @@ DepthCloud::Sums DepthCloud::sums_of_cell(int column) const noexcept {
   const auto at = [&](Column sum, int i) {
     return first[sum * width + static_cast<std::size_t>(i)];
   };
-  Eigen::Matrix<float, 10, 1> s = Eigen::Matrix<float, 10, 1>::Zero();
+  Sums sums;
+  sums.reference = at(kReference, 0);
   for (int i = 0; i < px; ++i) {
     const float u = static_cast<float>(i) - 0.5F * static_cast<float>(px - 1);
     const float n = at(kCount, i);
     const float q = at(kQ, i);
-    s[0] += n;
-    s[1] += n * u;
-    s[2] += at(kV, i);
-    s[3] += n * u * u;
-    s[4] += at(kV, i) * u;
-    s[5] += at(kVV, i);
-    s[6] += q;
-    s[7] += q * u;
-    s[8] += at(kQV, i);
-    s[9] += at(kQQ, i);
+    sums.n += n;
+    sums.u += n * u;
+    sums.v += at(kV, i);
+    sums.uu += n * u * u;
+    sums.uv += at(kV, i) * u;
+    sums.vv += at(kVV, i);
+    sums.q += q;
+    sums.qu += q * u;
+    sums.qv += at(kQV, i);
+    sums.qq += at(kQQ, i);
   }
-  return {.reference = at(kReference, 0),
-          .n = s[0],
-          .u = s[1],
-          .v = s[2],
-          .uu = s[3],
-          .uv = s[4],
-          .vv = s[5],
-          .q = s[6],
-          .qu = s[7],
-          .qv = s[8],
-          .qq = s[9]};
+  return sums;
 }
 
 Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcept {
-  const double pixels = grid_->cell_px() * grid_->cell_px();
-  if (sums.n < config_.min_fill * pixels) {
+  const auto wide = [](float value) { return static_cast<double>(value); };
+  const double n = wide(sums.n);
+  if (n < config_.min_fill * grid_->cell_px() * grid_->cell_px()) {
     return {};
   }
   // A plane's inverse depth is linear in the image: q = mean + slope . (u, v), fitted about the
   // pixels' centroid.
-  const double u = sums.u / sums.n;
-  const double v = sums.v / sums.n;
-  const double q = sums.q / sums.n;
-  const double uu = sums.uu - sums.n * u * u;
-  const double uv = sums.uv - sums.n * u * v;
-  const double vv = sums.vv - sums.n * v * v;
-  const double qu = sums.qu - sums.n * q * u;
-  const double qv = sums.qv - sums.n * q * v;
+  const double u = wide(sums.u) / n;
+  const double v = wide(sums.v) / n;
+  const double q = wide(sums.q) / n;
+  const double uu = wide(sums.uu) - n * u * u;
+  const double uv = wide(sums.uv) - n * u * v;
+  const double vv = wide(sums.vv) - n * v * v;
+  const double qu = wide(sums.qu) - n * q * u;
+  const double qv = wide(sums.qv) - n * q * v;
   const double determinant = uu * vv - uv * uv;
-  if (determinant <= 1e-3 * uu * vv) {
+  if (determinant <= kMinPixelSpread * uu * vv) {
     return {};
   }
   const Eigen::Vector2d slope{(vv * qu - uv * qv) / determinant, (uu * qv - uv * qu) / determinant};
-  const double squares = sums.qq - sums.n * q * q - slope.x() * qu - slope.y() * qv;
-  const double variance = std::max(squares, 0.0) / std::max(sums.n - 3.0, 1.0);
+  const double squares = wide(sums.qq) - n * q * q - slope.x() * qu - slope.y() * qv;
+  const double variance = std::max(squares, 0.0) / std::max(n - kPlaneParameters, 1.0);
   const double sigma2 = config_.inverse_depth_sigma * config_.inverse_depth_sigma;
   if (variance > config_.max_plane_rms * config_.max_plane_rms * sigma2) {
     return {};
@@ -265,18 +276,18 @@ Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcep
   // coordinates. A change e of q moves the point by z e / |n| along the normal.
   const Eigen::Vector2d at =
       ray.centre.cast<double>() + ray.per_pixel.cast<double>() * Eigen::Vector2d{u, v};
-  const double inverse_depth = q + sums.reference;
+  const double inverse_depth = q + wide(sums.reference);
   const Eigen::Vector2d g = ray.per_pixel.cast<double>().inverse().transpose() * slope;
-  const Eigen::Vector3d n{g.x(), g.y(), inverse_depth - g.dot(at)};
-  const double norm = n.norm();
+  const Eigen::Vector3d plane{g.x(), g.y(), inverse_depth - g.dot(at)};
+  const double norm = plane.norm();
   const double z = 1.0 / inverse_depth;
   if (inverse_depth < static_cast<double>(min_cosine_) * norm * std::sqrt(1.0 + at.squaredNorm())) {
     return {};
   }
-  const double independent = std::max(1.0, sums.n / config_.correlated_pixels);
+  const double independent = std::max(1.0, n / config_.correlated_pixels);
   Surfel surfel;
   surfel.point = (z * at.homogeneous()).cast<float>();
-  surfel.normal = (-n / norm).cast<float>();
+  surfel.normal = (-plane / norm).cast<float>();
   surfel.normal_variance =
       static_cast<float>(z * z * std::max(variance, sigma2) / (norm * norm * independent));
   surfel.tilt_variance =
@@ -300,8 +311,8 @@ void DepthCloud::smooth_normals() {
 
 Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   const Surfel& centre = surfels_[cell];
-  const Eigen::Vector4f own{centre.normal.x(), centre.normal.y(), centre.normal.z(),
-                            centre.tilt_variance};
+  Eigen::Vector4f own{centre.normal.x(), centre.normal.y(), centre.normal.z(),
+                      centre.tilt_variance};
   const float q0 = 1.0F / centre.point.z();
   const Eigen::Vector2f ray0 = q0 * centre.point.head<2>();
   const Eigen::Vector2f slope = centre.normal.head<2>() / centre.normal.dot(centre.point);
@@ -312,7 +323,9 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   PlaneFit plane;
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_->rows() - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
-      const Surfel& other = surfels_[static_cast<std::size_t>(r * columns + c)];
+      const Surfel& other =
+          surfels_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(c)];
       if (!other.valid()) {
         continue;
       }
@@ -323,7 +336,8 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
       }
     }
   }
-  if (!plane.solve() || plane.squares > (plane.count - 3.0F) * sigma * sigma) {
+  if (!plane.solve() ||
+      plane.squares > (plane.count - static_cast<float>(kPlaneParameters)) * sigma * sigma) {
     return own;  // alone, curved, or a fold
   }
   const Eigen::Vector3f normal{plane.slope.x(), plane.slope.y(), q0 - plane.slope.dot(ray0)};
