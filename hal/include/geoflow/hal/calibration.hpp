@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -17,7 +18,11 @@ enum class DistortionModel : std::uint8_t {
   kEquidistant,  ///< k1 k2 k3 k4: Kannala-Brandt fisheye
 };
 
-/// A pinhole camera. Pixel centres have integer coordinates, (0, 0) is the centre of the first pixel.
+/// Coefficients of the longest distortion model.
+inline constexpr std::size_t kMaxDistortionCoefficients = 5;
+
+/// A pinhole camera. Pixel centres have integer coordinates, (0, 0) is the centre of the first
+/// pixel.
 struct CameraIntrinsics {
   int width = 0;   ///< [px]
   int height = 0;  ///< [px]
@@ -26,21 +31,27 @@ struct CameraIntrinsics {
   double cx = 0;   ///< [px]
   double cy = 0;   ///< [px]
   DistortionModel model = DistortionModel::kNone;
-  std::array<double, 5> distortion{};  ///< in the order of `model`; unused ones are 0
+  std::array<double, kMaxDistortionCoefficients>
+      distortion{};  ///< in the order of `model`; unused ones are 0
 };
 
-/// Continuous-time noise, as in Kalibr's imu.yaml. Defaults: the D435i's BMI055 as published for GeoFlow-SLAM's robot.
+/// Continuous-time noise, as in Kalibr's imu.yaml. Defaults: the D435i's BMI055 as published for
+/// GeoFlow-SLAM's robot.
 struct ImuNoise {
+  // NOLINTBEGIN(readability-magic-numbers): each default is named, and given its unit, by its
+  // member
   double accel_noise_density = 1.176e-2;  ///< [m/s^2/sqrt(Hz)]
   double accel_random_walk = 1e-3;        ///< [m/s^3/sqrt(Hz)]
   double gyro_noise_density = 2.443e-3;   ///< [rad/s/sqrt(Hz)]
   double gyro_random_walk = 1e-4;         ///< [rad/s^2/sqrt(Hz)]
   double rate_hz = 200;
+  // NOLINTEND(readability-magic-numbers)
 };
 
 /// One robot's sensors. Depth is registered to the colour camera and shares its intrinsics.
 struct Calibration {
   CameraIntrinsics camera;
+  // NOLINTNEXTLINE(readability-magic-numbers): a millimetre
   double depth_unit_m = 1e-3;  ///< metres per count of a kDepth16 pixel
   std::optional<SE3> T_cam_imu{};
   /// t_imu = t_cam + this (Kalibr's timeshift_cam_imu).

@@ -5,12 +5,16 @@
 
 /// Rotations and rigid transforms, and the one statement of this project's conventions.
 ///
-/// - `T_a_b` maps coordinates in b to coordinates in a: `p_a = T_a_b * p_b`; inner names of products cancel
-///   (`T_a_c = T_a_b * T_b_c`). `R_a_b` is its rotation, `p_a_b` its translation: the position of b's origin in a.
+/// - `T_a_b` maps coordinates in b to coordinates in a: `p_a = T_a_b * p_b`; inner names of
+/// products cancel
+///   (`T_a_c = T_a_b * T_b_c`). `R_a_b` is its rotation, `p_a_b` its translation: the position of
+///   b's origin in a.
 /// - A tangent vector is (rotation, translation) [rad, m], in that order, 6 x 1.
-/// - Perturbations act on the right: `T = T_mean * SE3::exp(xi)`, so xi lives in the frame b of T_a_b.
+/// - Perturbations act on the right: `T = T_mean * SE3::exp(xi)`, so xi lives in the frame b of
+/// T_a_b.
 /// - A pose covariance is E[xi xi^T], 6 x 6, in that order and frame.
-/// - Frames: map -> odom -> base_link (REP-105: x forward, y left, z up) and cam, the colour camera's optical frame
+/// - Frames: map -> odom -> base_link (REP-105: x forward, y left, z up) and cam, the colour
+/// camera's optical frame
 ///   (x right, y down, z forward); imu is the camera's IMU.
 namespace geoflow {
 
@@ -24,7 +28,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 [[nodiscard]] Matrix3d skew(const Vector3d& v) noexcept;
 
 /// Functions of the rotation group SO(3), 3 x 3 rotation vectors in rad. Pure, thread-safe.
-/// Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", 2018, eq. (132)-(148).
+/// Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", 2018, eq.
+/// (132)-(148).
 namespace so3 {
 
 /// The rotation by |phi| about phi / |phi|, exact to first order at zero.
@@ -72,7 +77,8 @@ class SE3 {
   /// `T * exp(xi) * T^-1 == exp(T.adjoint() * xi)`.
   [[nodiscard]] Matrix6d adjoint() const noexcept;
 
-  /// `exp(xi + d) = exp(xi) * exp(right_jacobian(xi) * d)` to first order in d; and the inverse of that matrix.
+  /// `exp(xi + d) = exp(xi) * exp(right_jacobian(xi) * d)` to first order in d; and the inverse of
+  /// that matrix.
   [[nodiscard]] static Matrix6d right_jacobian(const Vector6d& xi) noexcept;
   [[nodiscard]] static Matrix6d right_jacobian_inverse(const Vector6d& xi) noexcept;
 

@@ -16,7 +16,8 @@ enum class PixelFormat : std::uint8_t {
   kRgb8,     ///< 3 bytes a pixel, red first
   kBgr8,     ///< 3 bytes a pixel, blue first
   kYuyv,     ///< 2 bytes a pixel, Y0 U Y1 V
-  kDepth16,  ///< 2 bytes a pixel, host byte order, in units of Calibration::depth_unit_m; 0 = no measurement
+  kDepth16,  ///< 2 bytes a pixel, host byte order, in units of Calibration::depth_unit_m; 0 = no
+             ///< measurement
 };
 
 [[nodiscard]] constexpr std::size_t bytes_per_pixel(PixelFormat format) noexcept {
@@ -33,7 +34,8 @@ enum class PixelFormat : std::uint8_t {
   return 0;
 }
 
-/// Width and height [px] and meaning of an image's pixels; rows are contiguous (stride = width * bytes_per_pixel).
+/// Width and height [px] and meaning of an image's pixels; rows are contiguous (stride = width *
+/// bytes_per_pixel).
 struct ImageShape {
   int width = 0;
   int height = 0;
@@ -50,8 +52,9 @@ struct ImageShape {
 
 class FramePool;
 
-/// A counted reference to one pooled image; empty when default-constructed. Copies share the pixels; the last one to go
-/// returns the memory to its pool, which it keeps alive. Distinct references may be used from distinct threads.
+/// A counted reference to one pooled image; empty when default-constructed. Copies share the
+/// pixels; the last one to go returns the memory to its pool, which it keeps alive. Distinct
+/// references may be used from distinct threads.
 class FrameRef {
  public:
   FrameRef() noexcept = default;
@@ -70,7 +73,8 @@ class FrameRef {
   /// The first pixel of a row as `Pixel` (std::uint8_t or std::uint16_t).
   template <typename Pixel>
   [[nodiscard]] const Pixel* row(int y) const noexcept {
-    const void* first = slot_->memory.data() + static_cast<std::size_t>(y) * slot_->shape.row_bytes();
+    const void* first =
+        slot_->memory.data() + static_cast<std::size_t>(y) * slot_->shape.row_bytes();
     return static_cast<const Pixel*>(first);
   }
 
@@ -86,13 +90,14 @@ class FrameRef {
   std::shared_ptr<Slot> slot_;
 };
 
-/// A fixed number of image buffers, each grown once to the largest size asked of it. Thread-safe, lock-free.
+/// A fixed number of image buffers, each grown once to the largest size asked of it. Thread-safe,
+/// lock-free.
 class FramePool {
  public:
   explicit FramePool(std::size_t capacity);
 
-  /// A frame of that shape with unspecified content, or an empty reference when all buffers are in use: the caller
-  /// drops and counts. Never blocks.
+  /// A frame of that shape with unspecified content, or an empty reference when all buffers are in
+  /// use: the caller drops and counts. Never blocks.
   [[nodiscard]] FrameRef acquire(const ImageShape& shape);
 
   [[nodiscard]] std::size_t capacity() const noexcept { return slots_->size(); }

@@ -1,12 +1,13 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <functional>
 #include <string_view>
 #include <utility>
 
-/// The log: one sink for the process, category and level on each line, nothing per frame above debug.
+#include <fmt/format.h>
+
+/// The log: one sink for the process, category and level on each line, nothing per frame above
+/// debug.
 namespace geoflow::log {
 
 enum class Level { kError, kWarning, kInfo, kDebug };
@@ -14,15 +15,17 @@ enum class Level { kError, kWarning, kInfo, kDebug };
 /// Receives every line that passes the level. Called under a lock, one line at a time.
 using Sink = std::function<void(Level, std::string_view category, std::string_view message)>;
 
-/// Replaces the sink; an empty one restores the default, which writes `<n>category: message` lines to stderr under
-/// systemd (the syslog priority that journald reads) and `level category: message` elsewhere. Thread-safe.
+/// Replaces the sink; an empty one restores the default, which writes `<n>category: message` lines
+/// to stderr under systemd (the syslog priority that journald reads) and `level category: message`
+/// elsewhere. Thread-safe.
 void set_sink(Sink sink);
 
 /// Lines above this level are dropped before they are formatted. Default kInfo. Thread-safe.
 void set_level(Level level) noexcept;
 [[nodiscard]] bool enabled(Level level) noexcept;
 
-/// Hands one formatted line to the sink. Thread-safe; may block on stderr, so not for the tracking path.
+/// Hands one formatted line to the sink. Thread-safe; may block on stderr, so not for the tracking
+/// path.
 void write(Level level, std::string_view category, std::string_view message);
 
 template <typename... Args>

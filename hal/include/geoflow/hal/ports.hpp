@@ -10,15 +10,16 @@
 
 /// The ports: how any source of samples, device or recording, hands them over.
 ///
-/// A port is started with a sink and calls it from one thread of its own choosing (the driver's, or the one that
-/// steps a recording), in order of arrival, until stop() has returned. Sinks must not block. start, stop and health may
-/// be called from one other thread.
+/// A port is started with a sink and calls it from one thread of its own choosing (the driver's, or
+/// the one that steps a recording), in order of arrival, until stop() has returned. Sinks must not
+/// block. start, stop and health may be called from one other thread.
 namespace geoflow {
 
 /// How a stream is stamped.
 enum class StampDomain : std::uint8_t {
   kDevice,  ///< by a clock inside the device: needs a clock model
-  kHost,    ///< t_device already is on the host's time line (recordings whose stamps were mapped when made)
+  kHost,  ///< t_device already is on the host's time line (recordings whose stamps were mapped when
+          ///< made)
 };
 
 /// What timesync must know of a stream's stamps.
@@ -77,7 +78,8 @@ class Source {
   Source& operator=(const Source&) = delete;
   virtual ~Source() = default;
 
-  /// Begins delivery to `sink`, which must outlive the matching stop(). An error leaves the source stopped.
+  /// Begins delivery to `sink`, which must outlive the matching stop(). An error leaves the source
+  /// stopped.
   [[nodiscard]] virtual Result<void> start(Sink& sink) = 0;
   /// Ends delivery: once it returns, the sink is not called again. Harmless when stopped.
   virtual void stop() = 0;

@@ -1,17 +1,19 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <string>
 #include <string_view>
-#include <tl/expected.hpp>
 #include <utility>
 
-/// Errors as values. Exceptions never cross a public boundary of this project; anything from outside (file, packet,
-/// client, device) that is wrong becomes an `Error` that names what and where.
+#include <fmt/format.h>
+#include <tl/expected.hpp>
+
+/// Errors as values. Exceptions never cross a public boundary of this project; anything from
+/// outside (file, packet, client, device) that is wrong becomes an `Error` that names what and
+/// where.
 namespace geoflow {
 
-/// What kind of failure, for code that decides by it (exit codes, recovery). The message is for people.
+/// What kind of failure, for code that decides by it (exit codes, recovery). The message is for
+/// people.
 enum class ErrorCode {
   kNotFound,         ///< a file, topic or device that should be there is not
   kInvalidData,      ///< bytes that do not follow their format
@@ -39,7 +41,8 @@ using Result = tl::expected<T, Error>;
 
 /// Makes a failed Result: `return fail(ErrorCode::kNotFound, "{}: no such file", path);`
 template <typename... Args>
-[[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> format, Args&&... args) {
+[[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> format,
+                                         Args&&... args) {
   return tl::unexpected<Error>{Error{code, fmt::format(format, std::forward<Args>(args)...)}};
 }
 

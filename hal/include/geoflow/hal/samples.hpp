@@ -29,11 +29,14 @@ struct JointState {
   double tau_nm = 0;
 };
 
-/// All legs at one instant. Joint of leg l: index l * 3 + {0 hip, 1 thigh, 2 calf}, legs in the order of `Leg`.
+/// All legs at one instant. Joint of leg l: index l * 3 + {0 hip, 1 thigh, 2 calf}, legs in the
+/// order of `Leg`.
 struct LegSample {
   std::array<JointState, kLegCount * kJointsPerLeg> joints{};
-  std::array<float, kLegCount> foot_force{};  ///< sensor counts or N as the robot reports it; 0 where there is none
-  std::array<bool, kLegCount> valid{};        ///< false where this leg's encoders were not heard this time
+  std::array<float, kLegCount>
+      foot_force{};  ///< sensor counts or N as the robot reports it; 0 where there is none
+  std::array<bool, kLegCount>
+      valid{};  ///< false where this leg's encoders were not heard this time
 };
 
 /// A robot's own odometry: the twist of base_link expressed in base_link.
@@ -52,7 +55,8 @@ struct DepthFrame {
   FrameRef image;
 };
 
-/// A sample as a port delivers it: stamped by its device's clock and by the host on arrival (CLOCK_MONOTONIC).
+/// A sample as a port delivers it: stamped by its device's clock and by the host on arrival
+/// (CLOCK_MONOTONIC).
 template <typename Clock, typename Sample>
 struct Arrival {
   DeviceTime<Clock> t_device;
@@ -64,7 +68,8 @@ struct Arrival {
 template <typename Sample>
 struct Timed {
   HostTime t;
-  Duration error_bound{};  ///< the true instant is within t +- this, as far as the clock model can tell
+  Duration
+      error_bound{};  ///< the true instant is within t +- this, as far as the clock model can tell
   Sample sample;
 };
 

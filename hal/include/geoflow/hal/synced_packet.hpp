@@ -10,16 +10,17 @@ namespace geoflow {
 
 /// All that the estimator needs for one camera frame: made by timesync, taken by slam.
 struct SyncedPacket {
-  HostTime t;                     ///< middle of the colour exposure
-  Duration error_bound{};         ///< of t
-  std::uint64_t sequence = 0;     ///< counts packets from 0, without gaps
-  FrameRef color;                 ///< never empty
-  FrameRef depth;                 ///< the nearest depth frame within tolerance; empty where there was none
-  Duration depth_offset{};        ///< t of depth minus t of colour
-  HostTime t_arrival;             ///< when the last of the frames reached the host
+  HostTime t;                  ///< middle of the colour exposure
+  Duration error_bound{};      ///< of t
+  std::uint64_t sequence = 0;  ///< counts packets from 0, without gaps
+  FrameRef color;              ///< never empty
+  FrameRef depth;  ///< the nearest depth frame within tolerance; empty where there was none
+  Duration depth_offset{};  ///< t of depth minus t of colour
+  HostTime t_arrival;       ///< when the last of the frames reached the host
 
-  /// Samples in (previous packet's t, this t], in order, plus the nearest one at or before and the nearest at or after
-  /// that interval where they exist, so that both ends can be interpolated. Empty where there is no such sensor.
+  /// Samples in (previous packet's t, this t], in order, plus the nearest one at or before and the
+  /// nearest at or after that interval where they exist, so that both ends can be interpolated.
+  /// Empty where there is no such sensor.
   std::vector<Timed<ImuSample>> imu;
   std::vector<Timed<LegSample>> legs;
   std::vector<Timed<BodyVelocitySample>> body_velocity;

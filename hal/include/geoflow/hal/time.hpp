@@ -3,10 +3,12 @@
 #include <chrono>
 #include <cstdint>
 
-/// Clocks and times. Integer nanoseconds everywhere; `double` seconds only as differences inside maths.
+/// Clocks and times. Integer nanoseconds everywhere; `double` seconds only as differences inside
+/// maths.
 ///
-/// Every clock is a type of its own, so a camera's time cannot be compared with an IMU's or the host's: it does not
-/// compile. The only bridge between a device's clock and the host's is `timesync::ClockModel`.
+/// Every clock is a type of its own, so a camera's time cannot be compared with an IMU's or the
+/// host's: it does not compile. The only bridge between a device's clock and the host's is
+/// `timesync::ClockModel`.
 namespace geoflow {
 
 using Duration = std::chrono::nanoseconds;
@@ -17,7 +19,8 @@ struct HostClock {
   using period = std::nano;
   using duration = Duration;
   using time_point = std::chrono::time_point<HostClock, Duration>;
-  static constexpr bool is_steady = true;  // NOLINT(readability-identifier-naming): required by the Clock concept
+  static constexpr bool is_steady =
+      true;  // NOLINT(readability-identifier-naming): required by the Clock concept
 
   /// Reads CLOCK_MONOTONIC. Thread-safe; never fails.
   [[nodiscard]] static time_point now() noexcept;
@@ -32,7 +35,8 @@ struct DeviceClock {
   using period = std::nano;
   using duration = Duration;
   using time_point = std::chrono::time_point<DeviceClock, Duration>;
-  static constexpr bool is_steady = true;  // NOLINT(readability-identifier-naming): required by the Clock concept
+  static constexpr bool is_steady =
+      true;  // NOLINT(readability-identifier-naming): required by the Clock concept
 };
 
 struct CameraDevice {};

@@ -13,7 +13,8 @@ namespace geoflow::tests {
 /// The seed of a random test: `$GEOFLOW_TEST_SEED`, or `fallback`. Print it in failure messages.
 [[nodiscard]] std::uint64_t test_seed(std::uint64_t fallback);
 
-/// A fresh directory under the system's temporary folder, removed with its content at the end of scope.
+/// A fresh directory under the system's temporary folder, removed with its content at the end of
+/// scope.
 class TemporaryDirectory {
  public:
   TemporaryDirectory();
@@ -29,9 +30,9 @@ class TemporaryDirectory {
 }  // namespace geoflow::tests
 
 /// Names the skipped test and what it lacks. Usage: `GEOFLOW_DATA_OR_SKIP(path, "kitchen-400");`
-#define GEOFLOW_DATA_OR_SKIP(variable, name)                                        \
-  const auto variable##_found = ::geoflow::tests::data_path(name);                  \
-  if (!variable##_found) {                                                          \
-    GTEST_SKIP() << "needs " << (name) << " in the folder named by GEOFLOW_DATA";   \
-  }                                                                                 \
+#define GEOFLOW_DATA_OR_SKIP(variable, name)                                      \
+  const auto variable##_found = ::geoflow::tests::data_path(name);                \
+  if (!variable##_found) {                                                        \
+    GTEST_SKIP() << "needs " << (name) << " in the folder named by GEOFLOW_DATA"; \
+  }                                                                               \
   const std::filesystem::path variable = *variable##_found
