@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/block_minima.hpp"
 
 #include "lower_envelope.hpp"
@@ -66,11 +67,14 @@ Placed ClockFit::add(std::int64_t device_ns, std::int64_t arrival_ns) noexcept {
 Placed ClockFit::place(std::int64_t device_ns) const noexcept {
   const std::int64_t from_origin = device_ns - line_.origin.device_ns;
   if (since_lock_ == 0 || from_origin > kFarNs || from_origin < -kFarNs) {
-    return {newest_.arrival_ns, std::numeric_limits<std::int64_t>::max(), true};
+    return {.t_ns = newest_.arrival_ns,
+            .error_bound_ns = std::numeric_limits<std::int64_t>::max(),
+            .by_arrival = true};
   }
   const double correction = line_.offset_ns + line_.drift * static_cast<double>(from_origin);
-  return {line_.origin.arrival_ns + from_origin + round_ns(correction),
-          round_ns(bound_ns(device_ns)), false};
+  return {.t_ns = line_.origin.arrival_ns + from_origin + round_ns(correction),
+          .error_bound_ns = round_ns(bound_ns(device_ns)),
+          .by_arrival = false};
 }
 
 std::int64_t ClockFit::expect_device_ns(std::int64_t arrival_ns) const noexcept {
@@ -127,13 +131,16 @@ void ClockFit::refit() noexcept {
   }
   const std::span<const EnvelopePoint> used{points.data(), minima_.size()};
   const double span = -used.front().x_ns;
-  std::optional<EnvelopeLine> fitted =
-      lower_envelope(used, {-config_.max_drift, config_.max_drift});
-  double drift_error = drift_error_of(fitted->scatter_ns, span);
+  const SlopeRange any_rate{.lowest = -config_.max_drift, .highest = config_.max_drift};
+  const SlopeRange known_rate{.lowest = line_.drift, .highest = line_.drift};
+  std::optional<EnvelopeLine> fitted = lower_envelope(used, any_rate);
+  double drift_error = drift_error_of(fitted ? fitted->scatter_ns : 0.0, span);
   if (minima_.size() < BlockMinima::kBlocks && drift_error > line_.drift_error) {
-    fitted = lower_envelope(used,
-                            {line_.drift, line_.drift});  // the rate known so far is the better one
+    fitted = lower_envelope(used, known_rate);  // what was known so far is the better one
     drift_error = line_.drift_error;
+  }
+  if (!fitted) {
+    return;
   }
   line_ = {.origin = origin,
            .offset_ns = fitted->offset_ns,
@@ -165,8 +172,9 @@ Placed ClockFit::place_doubtful(const StampPair& pair, double residual_ns) const
     placed = place(pair.device_ns);
   } else {
     const std::int64_t usual_delay = round_ns(spread_.median_ns());
-    placed = {pair.arrival_ns - usual_delay, std::max(config_.first_bound.count(), usual_delay),
-              true};
+    placed = {.t_ns = pair.arrival_ns - usual_delay,
+              .error_bound_ns = std::max(config_.first_bound.count(), usual_delay),
+              .by_arrival = true};
   }
   placed.error_bound_ns = std::max(placed.error_bound_ns, round_ns(lateness));
   return placed;

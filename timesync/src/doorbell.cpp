@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/poll.h>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"
@@ -24,7 +24,9 @@ int poll_timeout_ms(std::optional<Duration> timeout) {
   if (!timeout) {
     return -1;
   }
-  const auto rounded_up = std::chrono::ceil<std::chrono::milliseconds>(*timeout).count();
+  constexpr Duration kOneMs = std::chrono::milliseconds{1};
+  const std::int64_t rounded_up =
+      *timeout / kOneMs + (*timeout % kOneMs > Duration::zero() ? 1 : 0);
   return static_cast<int>(std::clamp<std::int64_t>(rounded_up, 0, std::numeric_limits<int>::max()));
 }
 

@@ -25,8 +25,7 @@ bool is_usable(const LegSample& sample) {
       return false;
     }
   }
-  return std::all_of(sample.foot_force.begin(), sample.foot_force.end(),
-                     [](float force) { return std::isfinite(force); });
+  return std::ranges::all_of(sample.foot_force, [](float force) { return std::isfinite(force); });
 }
 
 bool is_usable(const BodyVelocitySample& sample) {

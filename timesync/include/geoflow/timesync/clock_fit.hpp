@@ -39,6 +39,7 @@ namespace geoflow::timesync {
 
 /// What the fit may assume. The defaults fit USB and CAN devices.
 struct ClockFitConfig {
+  // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
   Duration first_bound =
       std::chrono::milliseconds{20};  ///< error bound of the first sample: a usual largest delay
   Duration min_delay = Duration::zero();  ///< known smallest delay from exposure to arrival
@@ -52,8 +53,9 @@ struct ClockFitConfig {
   double max_drift = 300e-6;    ///< largest |b|
   int jump_samples = 8;         ///< a jump is believed after so many that agree…
   Duration jump_span = std::chrono::milliseconds{200};  ///< …over so much device time,
-  Duration late_jump_span =
-      std::chrono::seconds{1};  ///< or this much if it could also be a slow transport
+  Duration late_jump_span = std::chrono::seconds{
+      1  // NOLINTEND(readability-magic-numbers)
+  };  ///< or this much if it could also be a slow transport
 };
 
 /// Where a stamp lies on the host's time line.

@@ -12,6 +12,7 @@ namespace geoflow::timesync {
 
 /// What the Synchroniser waits for, and how much it holds.
 struct SynchroniserConfig {
+  // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
   /// Largest distance of a colour and a depth frame that make a pair. The association lists of the
   /// TUM RGB-D benchmark (eleven sequences, 18520 pairs) go up to 19.9 ms.
   Duration depth_tolerance = std::chrono::milliseconds{20};
@@ -28,7 +29,8 @@ struct SynchroniserConfig {
   /// of their pool.
   std::size_t frame_capacity = 16;
   std::size_t sample_capacity = 4096;  ///< of IMU, legs, body velocity: 8 s at 500 Hz
-  ClockFitConfig clock{};              ///< for streams of StampDomain::kDevice
+  // NOLINTEND(readability-magic-numbers)
+  ClockFitConfig clock{};  ///< for streams of StampDomain::kDevice
 };
 
 /// Which streams there are, and how they are stamped.
