@@ -1,0 +1,121 @@
+#include "optimisation/factors.hpp"
+
+#include <array>
+#include <random>
+#include <vector>
+
+#include <Eigen/Core>
+#include <gtest/gtest.h>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "tests/support/data.hpp"
+
+#include "vision/camera_model.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+const CameraModel kCamera{
+    CameraIntrinsics{.width = 640, .height = 480, .fx = 517, .fy = 516, .cx = 318, .cy = 255}};
+
+/// The factor's Jacobian by a block's tangent against central differences along it.
+void expect_jacobians(const ceres::CostFunction& factor, std::vector<std::vector<double>> blocks) {
+  constexpr double kStep = 1e-6;
+  const PoseManifold manifold;
+  const int rows = factor.num_residuals();
+  std::vector<const double*> parameters;
+  std::vector<std::vector<double>> storage;
+  std::vector<double*> jacobians;
+  storage.reserve(blocks.size());
+  for (const auto& block : blocks) {
+    parameters.push_back(block.data());
+    storage.emplace_back(static_cast<std::size_t>(rows) * block.size());
+    jacobians.push_back(storage.back().data());
+  }
+  Eigen::VectorXd residuals{rows};
+  ASSERT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), jacobians.data()));
+  const auto residuals_at = [&](std::size_t block, int column, double step) {
+    std::vector<std::vector<double>> moved = blocks;
+    if (blocks[block].size() == kPoseSize) {
+      Vector6d delta = step * Vector6d::Unit(column);
+      EXPECT_TRUE(manifold.Plus(blocks[block].data(), delta.data(), moved[block].data()));
+    } else {
+      moved[block][static_cast<std::size_t>(column)] += step;
+    }
+    std::vector<const double*> at;
+    for (const auto& values : moved) {
+      at.push_back(values.data());
+    }
+    Eigen::VectorXd result{rows};
+    EXPECT_TRUE(factor.Evaluate(at.data(), result.data(), nullptr));
+    return result;
+  };
+  for (std::size_t block = 0; block < blocks.size(); ++block) {
+    const auto size = static_cast<int>(blocks[block].size());
+    const Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J{
+        storage[block].data(), rows, size};
+    const int tangent = size == kPoseSize ? kPoseTangentSize : size;
+    for (int column = 0; column < tangent; ++column) {
+      const Eigen::VectorXd numeric =
+          (residuals_at(block, column, kStep) - residuals_at(block, column, -kStep)) / (2 * kStep);
+      EXPECT_LT((numeric - J.col(column)).norm(), 1e-5 * (1 + numeric.norm()))
+          << "block " << block << " column " << column;
+    }
+  }
+}
+
+std::vector<double> block_of(const SE3& T) {
+  const PoseBlock block = to_block(T);
+  return {block.begin(), block.end()};
+}
+
+SE3 random_pose(std::mt19937_64& random, double scale) {
+  std::uniform_real_distribution<double> uniform{-scale, scale};
+  Vector6d xi;
+  for (double& value : xi) {
+    value = uniform(random);
+  }
+  return SE3::exp(xi);
+}
+
+TEST(Factors, JacobiansMatchDifferences) {
+  std::mt19937_64 random{tests::test_seed(3)};
+  for (int trial = 0; trial < 20; ++trial) {
+    const SE3 T_odom_cam = random_pose(random, 0.6);
+    const Vector3d p_odom = T_odom_cam * Vector3d{0.3, -0.2, 1.5 + 0.1 * trial};
+    const std::vector<double> point{p_odom.x(), p_odom.y(), p_odom.z()};
+    expect_jacobians(ReprojectionFactor{kCamera, {300, 200}, 1.5}, {block_of(T_odom_cam), point});
+    expect_jacobians(PointDepthFactor{1.7, 0.01}, {block_of(T_odom_cam), point});
+
+    Matrix6d root = Matrix6d::Random() + 3 * Matrix6d::Identity();
+    const SE3 T_a_b = random_pose(random, 0.6);
+    const SE3 T_odom_b = T_odom_cam * T_a_b * random_pose(random, 0.1);
+    expect_jacobians(RelativePoseFactor{T_a_b, root.transpose() * root},
+                     {block_of(T_odom_cam), block_of(T_odom_b)});
+  }
+}
+
+TEST(Factors, RelativePoseLeavesOpenDirectionsFree) {
+  Matrix6d information = Matrix6d::Identity();
+  information(5, 5) = 0;  // nothing is known along z
+  const RelativePoseFactor factor{SE3{}, information};
+  const auto a = block_of(SE3{});
+  const auto b = block_of(SE3{Eigen::Quaterniond::Identity(), {0, 0, 5}});
+  const std::array<const double*, 2> parameters{a.data(), b.data()};
+  Vector6d residuals;
+  ASSERT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), nullptr));
+  EXPECT_LT(residuals.norm(), 1e-12);
+}
+
+TEST(Factors, PointBehindTheCameraIsRefused) {
+  const auto pose = block_of(SE3{});
+  const std::vector<double> behind{0, 0, -1};
+  const std::array<const double*, 2> parameters{pose.data(), behind.data()};
+  Vector2d residuals;
+  const ReprojectionFactor factor{kCamera, {0, 0}, 1};
+  EXPECT_FALSE(factor.Evaluate(parameters.data(), residuals.data(), nullptr));
+}
+
+}  // namespace
+}  // namespace geoflow::slam
