@@ -217,11 +217,11 @@ Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
     return {pose->T_odom_cam, PoseSource::kPnp, true};
   }
   if (config_.switches.gicp && current_.cloud && previous_.cloud) {
-    const SE3& T_odom_previous = previous_.T_odom_cam;
-    const RegistrationResult found = register_from_afar(
-        *current_.cloud, *previous_.cloud, T_odom_previous.inverse() * predicted, gicp_);
+    const SE3& T_odom_target = previous_.T_odom_cam;
+    const RegistrationResult found = register_from_afar(*current_.cloud, *previous_.cloud,
+                                                        T_odom_target.inverse() * predicted, gicp_);
     if (found.converged) {
-      return {T_odom_previous * found.T_target_source, PoseSource::kGicp, found.overlap > kFits};
+      return {T_odom_target * found.T_target_source, PoseSource::kGicp, found.overlap > kFits};
     }
   }
   return {predicted, PoseSource::kConstantVelocity, false};

@@ -90,7 +90,8 @@ TEST(Factors, JacobiansMatchDifferences) {
 
     Matrix6d root = Matrix6d::Random() + 3 * Matrix6d::Identity();
     const SE3 T_a_b = random_pose(random, 0.6);
-    const SE3 T_odom_b = T_odom_cam * T_a_b * random_pose(random, 0.1);
+    const SE3& T_odom_a = T_odom_cam;
+    const SE3 T_odom_b = T_odom_a * T_a_b * random_pose(random, 0.1);
     expect_jacobians(RelativePoseFactor{T_a_b, root.transpose() * root},
                      {block_of(T_odom_cam), block_of(T_odom_b)});
   }
