@@ -52,37 +52,64 @@ void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) 
   keys.push_back({"synchroniser.clock.max_drift", &c.clock.max_drift, 0, 0.01});
 }
 
-void bind_slam_front(slam::Config& c, std::vector<Key>& keys) {
-  keys.push_back({"slam.switches.optical_flow", &c.switches.optical_flow});
-  keys.push_back({"slam.switches.gicp", &c.switches.gicp});
-  keys.push_back({"slam.features.cell_px", &c.features.cell_px, 8, 200});
-  keys.push_back({"slam.features.features_per_cell", &c.features.features_per_cell, 1, 20});
-  keys.push_back({"slam.features.fast_threshold", &c.features.fast_threshold, 1, 200});
-  keys.push_back(
-      {"slam.features.fast_threshold_minimum", &c.features.fast_threshold_minimum, 1, 200});
-  keys.push_back({"slam.features.mask_radius_px", &c.features.mask_radius_px, 0, 100});
-  keys.push_back({"slam.flow.window_px", &c.flow.window_px, 5, 61});
-  keys.push_back({"slam.flow.prior_levels", &c.flow.prior_levels, 0, 6});
-  keys.push_back({"slam.flow.levels", &c.flow.levels, 0, 6});
-  keys.push_back({"slam.flow.forward_backward_px", &c.flow.forward_backward_px, 0.01, 20});
-  keys.push_back({"slam.flow.fundamental_threshold_px", &c.flow.fundamental_threshold_px, 0.1, 20});
+// The structured bindings of the estimator's structs name every member: one that is added without a
+// key here does not compile.
+
+void bind_features(slam::FeatureConfig& c, std::vector<Key>& keys) {
+  auto& [cell_px, per_cell, threshold, minimum, mask_radius_px] = c;
+  keys.push_back({"slam.features.cell_px", &cell_px, 8, 200});
+  keys.push_back({"slam.features.features_per_cell", &per_cell, 1, 20});
+  keys.push_back({"slam.features.fast_threshold", &threshold, 1, 200});
+  keys.push_back({"slam.features.fast_threshold_minimum", &minimum, 1, 200});
+  keys.push_back({"slam.features.mask_radius_px", &mask_radius_px, 0, 100});
 }
 
-void bind_slam_back(slam::Config& c, std::vector<Key>& keys) {
-  keys.push_back({"slam.pose.pixel_sigma", &c.pose.pixel_sigma, 0.01, 20});
-  keys.push_back({"slam.pose.minimum_visual_inliers", &c.pose.minimum_visual_inliers, 6, 1000});
-  keys.push_back({"slam.pose.pnp_threshold_px", &c.pose.pnp_threshold_px, 0.1, 50});
-  keys.push_back({"slam.pose.gicp_targets", &c.pose.gicp_targets, 1, 20});
-  keys.push_back({"slam.pose.iterations", &c.pose.iterations, 1, 100});
-  keys.push_back({"slam.keyframes.translation_m", &c.keyframes.translation_m, 0.001, 10});
-  keys.push_back({"slam.keyframes.rotation_rad", &c.keyframes.rotation_rad, 0.001, 3.14});
-  keys.push_back({"slam.keyframes.overlap", &c.keyframes.overlap, 0, 1});
-  keys.push_back({"slam.keyframes.maximum_interval_s", &c.keyframes.maximum_interval, 0.01, 3600});
-  keys.push_back({"slam.mapping.window", &c.mapping.window, 2, 100});
-  keys.push_back({"slam.mapping.fixed", &c.mapping.fixed, 1, 200});
-  keys.push_back({"slam.mapping.gicp_neighbours", &c.mapping.gicp_neighbours, 0, 50});
-  keys.push_back({"slam.mapping.iterations", &c.mapping.iterations, 1, 100});
-  keys.push_back({"slam.mapping.depth_sigma_at_1m", &c.mapping.depth_sigma_at_1m, 1e-5, 1});
+void bind_flow(slam::FlowConfig& c, std::vector<Key>& keys) {
+  auto& [window_px, prior_levels, levels, forward_backward_px, fundamental_px] = c;
+  keys.push_back({"slam.flow.window_px", &window_px, 5, 61});
+  keys.push_back({"slam.flow.prior_levels", &prior_levels, 0, 6});
+  keys.push_back({"slam.flow.levels", &levels, 0, 6});
+  keys.push_back({"slam.flow.forward_backward_px", &forward_backward_px, 0.01, 20});
+  keys.push_back({"slam.flow.fundamental_threshold_px", &fundamental_px, 0.1, 20});
+}
+
+void bind_pose(slam::PoseConfig& c, std::vector<Key>& keys) {
+  auto& [pixel_sigma, minimum_inliers, pnp_px, targets, surfels, iterations] = c;
+  keys.push_back({"slam.pose.pixel_sigma", &pixel_sigma, 0.01, 20});
+  keys.push_back({"slam.pose.minimum_visual_inliers", &minimum_inliers, 6, 1000});
+  keys.push_back({"slam.pose.pnp_threshold_px", &pnp_px, 0.1, 50});
+  keys.push_back({"slam.pose.gicp_targets", &targets, 1, 20});
+  keys.push_back({"slam.pose.gicp_surfels", &surfels, 50, 20000});
+  keys.push_back({"slam.pose.iterations", &iterations, 1, 100});
+}
+
+void bind_keyframes(slam::KeyframeConfig& c, std::vector<Key>& keys) {
+  auto& [translation_m, rotation_rad, overlap, maximum_interval] = c;
+  keys.push_back({"slam.keyframes.translation_m", &translation_m, 0.001, 10});
+  keys.push_back({"slam.keyframes.rotation_rad", &rotation_rad, 0.001, 3.14});
+  keys.push_back({"slam.keyframes.overlap", &overlap, 0, 1});
+  keys.push_back({"slam.keyframes.maximum_interval_s", &maximum_interval, 0.01, 3600});
+}
+
+void bind_mapping(slam::MappingConfig& c, std::vector<Key>& keys) {
+  auto& [window, fixed, gicp_neighbours, iterations, depth_sigma] = c;
+  keys.push_back({"slam.mapping.window", &window, 2, 100});
+  keys.push_back({"slam.mapping.fixed", &fixed, 1, 200});
+  keys.push_back({"slam.mapping.gicp_neighbours", &gicp_neighbours, 0, 50});
+  keys.push_back({"slam.mapping.iterations", &iterations, 1, 100});
+  keys.push_back({"slam.mapping.depth_sigma_at_1m", &depth_sigma, 1e-5, 1});
+}
+
+void bind_slam(slam::Config& c, std::vector<Key>& keys) {
+  auto& [switches, features, flow, pose, keyframes, mapping] = c;
+  auto& [optical_flow, gicp] = switches;
+  keys.push_back({"slam.switches.optical_flow", &optical_flow});
+  keys.push_back({"slam.switches.gicp", &gicp});
+  bind_features(features, keys);
+  bind_flow(flow, keys);
+  bind_pose(pose, keys);
+  bind_keyframes(keyframes, keys);
+  bind_mapping(mapping, keys);
 }
 
 void bind_socket(SocketConfig& c, std::vector<Key>& keys) {
@@ -122,8 +149,7 @@ std::vector<Key> bind_keys(Config& config) {
   bind_source(config.source, keys);
   bind_topics(config.topics, keys);
   bind_synchroniser(config.synchroniser, keys);
-  bind_slam_front(config.slam, keys);
-  bind_slam_back(config.slam, keys);
+  bind_slam(config.slam, keys);
   bind_socket(config.socket, keys);
   bind_pipeline(config.pipeline, keys);
   return keys;
