@@ -83,6 +83,7 @@ TEST(Factors, JacobiansMatchDifferences) {
   std::mt19937_64 random{tests::test_seed(3)};
   for (int trial = 0; trial < 20; ++trial) {
     const SE3 T_odom_cam = random_pose(random, 0.6);
+    const SE3 T_odom_a = random_pose(random, 0.6);
     const Vector3d p_odom = T_odom_cam * Vector3d{0.3, -0.2, 1.5 + 0.1 * trial};
     const std::vector<double> point{p_odom.x(), p_odom.y(), p_odom.z()};
     expect_jacobians(ReprojectionFactor{kCamera, {300, 200}, 1.5}, {block_of(T_odom_cam), point});
@@ -90,10 +91,9 @@ TEST(Factors, JacobiansMatchDifferences) {
 
     Matrix6d root = Matrix6d::Random() + 3 * Matrix6d::Identity();
     const SE3 T_a_b = random_pose(random, 0.6);
-    const SE3& T_odom_a = T_odom_cam;
     const SE3 T_odom_b = T_odom_a * T_a_b * random_pose(random, 0.1);
     expect_jacobians(RelativePoseFactor{T_a_b, root.transpose() * root},
-                     {block_of(T_odom_cam), block_of(T_odom_b)});
+                     {block_of(T_odom_a), block_of(T_odom_b)});
   }
 }
 
