@@ -1,12 +1,11 @@
 #include "replay/bag/bag_calibration.hpp"
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "geoflow/drivers/recording.hpp"
-#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/log.hpp"
 
 #include "replay/bag/bag.hpp"

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <ios>
 #include <memory>
 #include <optional>
 #include <span>
@@ -249,6 +250,9 @@ Result<std::optional<MessageRow>> BagFile::next() {
 }
 
 Result<std::span<const std::byte>> BagFile::data(const MessageRow& row) {
+  if (!data_) {
+    return fail(ErrorCode::kInvalidArgument, "{}: no topics were selected", describe(row));
+  }
   data_->reset();
   const auto found = data_->bind(1, row.number).step();
   if (!found) {
@@ -274,8 +278,8 @@ std::string BagFile::describe(const MessageRow& row) const {
 }
 
 std::optional<std::size_t> BagFile::index_of(std::int64_t topic_id) const {
-  const auto found = std::ranges::lower_bound(topics_, topic_id, {}, &FileTopic::id);
-  if (found == topics_.end() || found->id != topic_id) {
+  const auto found = std::ranges::find(topics_, topic_id, &FileTopic::id);
+  if (found == topics_.end()) {
     return std::nullopt;
   }
   return static_cast<std::size_t>(found - topics_.begin());

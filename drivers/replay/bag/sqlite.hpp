@@ -64,6 +64,8 @@ class Database {
 
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
+  Database(Database&&) = delete;
+  Database& operator=(Database&&) = delete;
   ~Database() = default;
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql) const;

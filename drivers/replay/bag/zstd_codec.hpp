@@ -28,6 +28,8 @@ class Compressor {
   explicit Compressor(int level);
   Compressor(const Compressor&) = delete;
   Compressor& operator=(const Compressor&) = delete;
+  Compressor(Compressor&&) = delete;
+  Compressor& operator=(Compressor&&) = delete;
   ~Compressor();
   [[nodiscard]] Result<std::vector<std::byte>> compress(std::span<const std::byte> bytes);
 

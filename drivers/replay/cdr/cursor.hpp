@@ -43,7 +43,7 @@ class Reader {
   }
   template <Composite T>
   void read(T& value) {
-    std::apply([this](auto&... member) { (read(member), ...); }, T::fields(value));
+    std::apply([this](auto&... member) { (this->read(member), ...); }, T::fields(value));
   }
   template <typename T, std::size_t Size>
   void read(std::array<T, Size>& values) {
@@ -108,7 +108,7 @@ class Writer {
   }
   template <Composite T>
   void write(const T& value) {
-    std::apply([this](const auto&... member) { (write(member), ...); }, T::fields(value));
+    std::apply([this](const auto&... member) { (this->write(member), ...); }, T::fields(value));
   }
   template <typename T, std::size_t Size>
   void write(const std::array<T, Size>& values) {

@@ -21,9 +21,10 @@ namespace geoflow::drivers::ros {
 /// to be written.
 using Bytes = std::span<const std::byte>;
 
-using Matrix3 = std::array<double, 3 * 3>;      ///< row by row
-using Matrix34 = std::array<double, 3 * 4>;     ///< row by row
-using Covariance6 = std::array<double, 6 * 6>;  ///< row by row; (x, y, z, rotation about x, y, z)
+using Matrix3 = std::array<double, std::size_t{3} * 3>;   ///< row by row
+using Matrix34 = std::array<double, std::size_t{3} * 4>;  ///< row by row
+using Covariance6 =
+    std::array<double, std::size_t{6} * 6>;  ///< row by row; (x, y, z, rotation about x, y, z)
 
 /// builtin_interfaces/Time.
 struct Time {

@@ -38,7 +38,7 @@ class FastCdrOracle {
     if constexpr (std::is_arithmetic_v<T>) {
       cdr_ << value;
     } else {
-      std::apply([this](const auto&... member) { (write(member), ...); }, T::fields(value));
+      std::apply([this](const auto&... member) { (this->write(member), ...); }, T::fields(value));
     }
   }
   // Fast-CDR cannot write a string with a zero inside; the wire can.

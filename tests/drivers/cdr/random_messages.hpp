@@ -57,7 +57,7 @@ class RandomMessages {
   template <typename T>
     requires requires(T& value) { T::fields(value); }
   void fill(T& message) {
-    std::apply([this](auto&... member) { (fill(member), ...); }, T::fields(message));
+    std::apply([this](auto&... member) { (this->fill(member), ...); }, T::fields(message));
   }
 
   std::list<std::vector<std::uint8_t>> bytes_;
