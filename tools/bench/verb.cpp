@@ -18,10 +18,14 @@
 #include "geoflow/tools/bench/table.hpp"
 #include "geoflow/tools/console.hpp"
 
+#include "bench/gicp_benchmark.hpp"
+#include "bench/gicp_table.hpp"
+
 namespace geoflow::tools {
 namespace {
 
 constexpr int kMaxRuns = 1000;
+constexpr int kMaxPairs = 100'000;
 
 /// `geoflow bench BENCHMARK RECORDING`.
 class BenchVerb final : public Verb {
@@ -34,41 +38,58 @@ class BenchVerb final : public Verb {
     return "  geoflow bench replay kitchen-400 --runs 5        frames a second, stage times and "
            "memory of five runs\n"
            "  geoflow bench replay kitchen-400 --csv           the same for a spreadsheet\n"
+           "  geoflow bench gicp kitchen-400 --pairs 100       registration of depth frames beside "
+           "PCL's, times and errors\n"
            "  geoflow bench replay kitchen-400 --json          the same for scripts, with the "
            "machine\n"
            "How to measure so that figures can be compared: docs/benchmarks.md.";
   }
 
   void declare(CLI::App& command) override {
-    command.add_option("BENCHMARK", benchmark_, "What to measure: replay")
+    command
+        .add_option("BENCHMARK", benchmark_,
+                    "What to measure: replay, or gicp (frame-to-frame registration beside PCL's)")
         ->required()
-        ->check(CLI::IsMember({"replay"}).description(""));
+        ->check(CLI::IsMember({"replay", "gicp"}).description(""));
     command.add_option("RECORDING", recording_, "Folder of the recording")->required();
-    command.add_option("--runs", runs_, "How many times")
+    command.add_option("--runs", runs_, "replay: how many times")
         ->check(CLI::Range(1, kMaxRuns))
         ->capture_default_str();
     command.add_option("--calibration", calibration_,
                        "Folder with Kalibr files (default: the recording's)");
+    command.add_option("--reference", reference_,
+                       "gicp: TUM file of camera poses (default: groundtruth.txt in RECORDING)");
+    command.add_option("--pairs", pairs_, "gicp: pairs of frames for each step")
+        ->check(CLI::Range(1, kMaxPairs))
+        ->capture_default_str();
     command.add_flag("--csv", csv_, "Print CSV instead of a Markdown table");
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
+    return measure().map([&](const BenchTable& table) {
+      print(console, table);
+      return ExitCode::kOk;
+    });
+  }
+
+ private:
+  [[nodiscard]] Result<BenchTable> measure() const {
+    if (benchmark_ == "gicp") {
+      GicpBenchmarkOptions options{.recording = recording_, .pairs = pairs_};
+      if (!reference_.empty()) {
+        options.reference = reference_;
+      }
+      return run_gicp_table(options);
+    }
     std::error_code status;
     const auto program = std::filesystem::read_symlink("/proc/self/exe", status);
     if (status) {
       return fail(ErrorCode::kSystem, "/proc/self/exe: {}", status.message());
     }
-    return run_replay_benchmark({.program = program,
-                                 .recording = recording_,
-                                 .calibration = calibration_,
-                                 .runs = runs_})
-        .map([&](const BenchTable& table) {
-          print(console, table);
-          return ExitCode::kOk;
-        });
+    return run_replay_benchmark(
+        {.program = program, .recording = recording_, .calibration = calibration_, .runs = runs_});
   }
 
- private:
   void print(Console& console, const BenchTable& table) const {
     const Machine machine = this_machine();
     console.object(to_json(table, machine));
@@ -84,7 +105,9 @@ class BenchVerb final : public Verb {
   std::string benchmark_;
   std::string recording_;
   std::string calibration_;
+  std::string reference_;
   int runs_ = 3;
+  int pairs_ = 100;
   bool csv_ = false;
 };
 
