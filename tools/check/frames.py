@@ -7,7 +7,8 @@ By the convention of hal/geometry.hpp `T_a_b` maps coordinates in b to coordinat
   T_a_d = T_a_b * T_b_c       is refused because the outer frames are a and c,
   T_a_b = T_b_a               is refused: .inverse() is missing.
 `const SE3& T_odom_anchor = anchor.T_odom_cam` is how the pose of another object gets the name that a product needs.
-The roles parent, child, target and source take any frame: `.T_parent_child = T_odom_base`.
+The roles parent, child, target and source stand for any frame when a value is passed on, but not in a product:
+`.T_parent_child = T_odom_base`, `const SE3& T_previous_cam = found.T_target_source`.
 Inverses and transposes swap the frames. Digits tell instances of a frame (cam0, cam1): two numbers must agree, a name
 without a number fits any. `// frames: REASON` on the line of the product excuses it.
 """
@@ -50,7 +51,7 @@ def agree(a, b):
 
 def fits(role, frame):
     """May a transform with this frame be given to a name with that one?"""
-    return role in ROLES or agree(role, frame)
+    return role in ROLES or frame in ROLES or agree(role, frame)
 
 
 def tokenise(text):

@@ -86,6 +86,7 @@ class Products(unittest.TestCase):
 
     def test_a_role_takes_any_frame(self):
         self.assert_accepts("send({.T_parent_child = T_odom_base});")
+        self.assert_accepts("const SE3& T_previous_cam = found.T_target_source;")
         self.assert_refuses("auto x = T_odom_base * T_parent_child;")
 
     def test_a_reason_excuses(self):
