@@ -175,43 +175,32 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   }
 }
 
-MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
-  auto problem = std::make_shared<MappingProblem>();
-  problem->camera = camera_.intrinsics();
-  problem->pose = config_.pose;
-  problem->mapping = config_.mapping;
-  problem->gicp = gicp_;
-
+std::vector<std::pair<KeyframeId, KeyframeId>> MapBuilder::edges_to_measure(
+    const Map& map, KeyframeId newest) const {
   const Keyframe& center = map.keyframe(newest);
-  std::vector<OverlappingKeyframe> overlapping;
-  if (config_.switches.gicp && center.cloud) {
-    overlapping = overlapping_keyframes(map, *center.cloud, center.T_odom_cam, kEdgeOverlap);
-    std::erase_if(overlapping, [&](const OverlappingKeyframe& k) { return k.id == newest; });
+  if (!config_.switches.gicp || !center.cloud) {
+    return {};
   }
+  auto overlapping = overlapping_keyframes(map, *center.cloud, center.T_odom_cam, kEdgeOverlap);
+  std::erase_if(overlapping, [&](const OverlappingKeyframe& k) { return k.id == newest; });
+  std::vector<std::pair<KeyframeId, KeyframeId>> edges;
   for (const KeyframeId id : registration_targets(
            overlapping, static_cast<std::size_t>(config_.mapping.gicp_neighbours))) {
-    problem->edges_to_measure.emplace_back(id, newest);
+    edges.emplace_back(id, newest);
   }
+  return edges;
+}
 
-  // The window moves: the newest keyframes. Held: those most connected with it, by edges and by
-  // points.
-  std::set<KeyframeId> moving;
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
-    if (moving.size() < static_cast<std::size_t>(config_.mapping.window)) {
-      moving.insert(it->first);
-    }
-  }
-  std::map<KeyframeId, std::size_t> connection;
+std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<KeyframeId>& moving,
+                                                const std::set<PointId>& points,
+                                                const MappingProblem& problem) const {
   constexpr std::size_t kEdgeCounts = 100;  // an edge ties as firmly as this many common points
-  const auto connect = [&](KeyframeId a, KeyframeId b, std::size_t strength) {
+  std::map<KeyframeId, std::size_t> connection;
+  const auto connect = [&](KeyframeId a, KeyframeId b) {
     if (moving.contains(a) != moving.contains(b)) {
-      connection[moving.contains(a) ? b : a] += strength;
+      connection[moving.contains(a) ? b : a] += kEdgeCounts;
     }
   };
-  std::set<PointId> points;
-  for (const KeyframeId id : moving) {
-    points.insert(map.keyframe(id).points.begin(), map.keyframe(id).points.end());
-  }
   for (const PointId id : points) {
     for (const Observation& observation : map.find_point(id)->observations) {
       if (!moving.contains(observation.keyframe)) {
@@ -220,10 +209,10 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
     }
   }
   for (const DepthEdge& edge : map.edges()) {
-    connect(edge.from, edge.to, kEdgeCounts);
+    connect(edge.from, edge.to);
   }
-  for (const auto& [from, to] : problem->edges_to_measure) {
-    connect(from, to, kEdgeCounts);
+  for (const auto& [from, to] : problem.edges_to_measure) {
+    connect(from, to);
   }
   std::vector<std::pair<std::size_t, KeyframeId>> by_connection;
   for (const auto& [id, strength] : connection) {
@@ -232,19 +221,40 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
   std::sort(by_connection.rbegin(), by_connection.rend());
   by_connection.resize(
       std::min(by_connection.size(), static_cast<std::size_t>(config_.mapping.fixed)));
-  std::set<KeyframeId> fixed;
+  std::set<KeyframeId> held;
   for (const auto& [strength, id] : by_connection) {
-    fixed.insert(id);
+    held.insert(id);
   }
+  return held;
+}
+
+MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
+  auto problem = std::make_shared<MappingProblem>();
+  problem->camera = camera_.intrinsics();
+  problem->pose = config_.pose;
+  problem->mapping = config_.mapping;
+  problem->gicp = gicp_;
+  problem->edges_to_measure = edges_to_measure(map, newest);
+
+  std::set<KeyframeId> moving;
+  std::set<PointId> points;
+  for (auto it = map.keyframes().rbegin();
+       it != map.keyframes().rend() &&
+       moving.size() < static_cast<std::size_t>(config_.mapping.window);
+       ++it) {
+    moving.insert(it->first);
+    points.insert(it->second.points.begin(), it->second.points.end());
+  }
+  const std::set<KeyframeId> held = held_keyframes(map, moving, points, *problem);
+  const auto inside = [&](KeyframeId id) { return moving.contains(id) || held.contains(id); };
   for (const auto& [id, keyframe] : map.keyframes()) {
-    if (moving.contains(id) || fixed.contains(id)) {
-      problem->keyframes.push_back({id, keyframe.T_odom_cam, fixed.contains(id), keyframe.cloud});
+    if (inside(id)) {
+      problem->keyframes.push_back({id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud});
     }
   }
-  if (fixed.empty()) {
+  if (held.empty()) {
     problem->keyframes.front().fixed = true;
   }
-  const auto inside = [&](KeyframeId id) { return moving.contains(id) || fixed.contains(id); };
   for (const PointId id : points) {
     const MapPoint& point = *map.find_point(id);
     MappingPoint snapshot{id, point.p_odom, {}};

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <optional>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
@@ -38,6 +39,16 @@ class MapBuilder {
   [[nodiscard]] SE3 apply(Map& map, const MappingSolution& solution) const;
 
  private:
+  /// Pairs of keyframes whose depth is to be registered: the newest with those that see what it
+  /// sees.
+  [[nodiscard]] std::vector<std::pair<KeyframeId, KeyframeId>> edges_to_measure(
+      const Map& map, KeyframeId newest) const;
+  /// Keyframes outside the window that are most connected with it, by points and by edges: its
+  /// anchors.
+  [[nodiscard]] std::set<KeyframeId> held_keyframes(const Map& map,
+                                                    const std::set<KeyframeId>& moving,
+                                                    const std::set<PointId>& points,
+                                                    const MappingProblem& problem) const;
   void observe_features(Map& map, KeyframeId keyframe, Frame& frame) const;
   void triangulate(Map& map, KeyframeId keyframe, Feature& feature) const;
   void add_features(Map& map, KeyframeId keyframe, Frame& frame);

@@ -133,8 +133,6 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) 
     const Vector6d from_prior = (problem.prior.T_odom_cam.inverse() * solution.T_odom_cam).log();
     system.gradient += problem.prior.information * from_prior;
     solution.information = system.visual + system.depth + problem.prior.information;
-    solution.visual_information = system.visual;
-    solution.depth_information = system.depth;
     solution.depth_inliers = system.depth_inliers;
     const Vector6d step = -solution.information.ldlt().solve(system.gradient);
     if (!step.allFinite()) {

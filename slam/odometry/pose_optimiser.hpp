@@ -50,8 +50,6 @@ struct PoseSolution {
       0;  ///< of depth_surfels, the largest number that pairs with one target
   std::uint32_t depth_surfels = 0;  ///< of the frame that were tried
   double pixel_sigma = 0;  ///< standard deviation of the visual residuals, estimated from them [px]
-  Matrix6d visual_information = Matrix6d::Zero();
-  Matrix6d depth_information = Matrix6d::Zero();
 };
 
 /// Robust Gauss-Newton from `start`. Residuals:
