@@ -1,15 +1,11 @@
 #include "config/keys.hpp"
 
-#include <algorithm>
-#include <cstddef>
-#include <limits>
-#include <numeric>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/hal/nearest_name.hpp"
 
 // The bounds below are the values for which the code is meant and tested; each is stated with its
 // key in config/geoflow.toml. NOLINTBEGIN(readability-magic-numbers)
@@ -128,20 +124,6 @@ void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
   keys.push_back({"pipeline.sample_queue", &c.sample_queue, 16, 65536});
 }
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({substituted, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
 }  // namespace
 
 std::vector<Key> bind_keys(Config& config) {
@@ -156,18 +138,12 @@ std::vector<Key> bind_keys(Config& config) {
 }
 
 std::string nearest_key(const std::vector<Key>& keys, std::string_view unknown) {
-  constexpr std::size_t kLongestCompared = 128;
-  const std::string_view compared = unknown.substr(0, kLongestCompared);
-  std::size_t best = std::numeric_limits<std::size_t>::max();
-  std::string nearest;
+  std::vector<std::string_view> names;
+  names.reserve(keys.size());
   for (const Key& key : keys) {
-    const std::size_t distance = edit_distance(compared, key.name);
-    if (distance < best) {
-      best = distance;
-      nearest = key.name;
-    }
+    names.emplace_back(key.name);
   }
-  return nearest;
+  return std::string{nearest_name(names, unknown)};
 }
 
 }  // namespace geoflow::daemon
