@@ -1,0 +1,27 @@
+#include "inertial/nav_state.hpp"
+
+#include "geoflow/hal/geometry.hpp"
+
+namespace geoflow::slam {
+
+Vector6d ImuBias::vector() const {
+  Vector6d v;
+  v << gyro_radps, accel_mps2;
+  return v;
+}
+
+NavState NavState::plus(const StateVector& delta) const {
+  return {T_odom_imu * SE3::exp(delta.head<kVelocityAt>()),
+          v_odom + delta.segment<3>(kVelocityAt),
+          {bias.gyro_radps + delta.segment<3>(kGyroBiasAt),
+           bias.accel_mps2 + delta.segment<3>(kAccelBiasAt)}};
+}
+
+StateVector NavState::minus(const NavState& other) const {
+  StateVector delta;
+  delta << (other.T_odom_imu.inverse() * T_odom_imu).log(), v_odom - other.v_odom,
+      bias.vector() - other.bias.vector();
+  return delta;
+}
+
+}  // namespace geoflow::slam
