@@ -61,6 +61,7 @@ LIBRARIES = (
     Library("RapidCheck", r"rapidcheck", ("rapidcheck", "rapidcheck_gtest"), ()),
     Library("Google Benchmark", r"benchmark/", ("benchmark::benchmark", "benchmark::benchmark_main"), ()),
     Library("PCL", r"pcl/", ("${PCL_LIBRARIES}", "pcl_common", "pcl_registration", "pcl_filters"), ("tools/bench",)),
+    Library("Clang", r"(clang|llvm)/", (), ("tools/check",)),
     Library("Fast-CDR", r"fastcdr/", ("fastcdr",), ()),
     Library("threads", r"\0", ("Threads::Threads",), EVERYWHERE),
 )

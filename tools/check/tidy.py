@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import source
@@ -20,26 +21,44 @@ import source
 TOP = Path(source.top_of(__file__))
 BUILD = TOP / "build/clang"
 PASSED = BUILD / "tidy-passed"
+SCOPE = TOP / "tools/check/own_scope.cpp"
+CONFIGURATIONS = sorted([TOP / ".clang-tidy", *TOP.glob("[a-z]*/.clang-tidy")])
 
 
 def run(*command):
     return subprocess.run(command, cwd=TOP, capture_output=True, text=True, check=False)
 
 
-def own_headers(entry):
-    """The project's own files that one compile command reads, itself included."""
-    command = re.sub(r"\s-o\s+\S+", "", entry["command"])
-    made = subprocess.run(f"{command} -MM -MF -", shell=True, cwd=entry["directory"], capture_output=True, text=True,
-                          check=False)
-    names = made.stdout.replace("\\\n", " ").split()[1:]
-    paths = {(Path(entry["directory"]) / name).resolve() for name in names} | {Path(entry["file"])}
-    return sorted(path for path in paths if path.is_relative_to(TOP))
+@cache
+def included(path):
+    """What a file includes in quotes: the project's own files are included so, and only they."""
+    return re.findall(r'^\s*#\s*include\s+"([^"]+)"', path.read_text(errors="replace"), re.MULTILINE)
+
+
+def own_files(entry):
+    """The project's own files that one compile command reads, the source itself included."""
+    folders = [Path(folder) for folder in re.findall(r"-I\s*(\S+)", entry["command"])]
+    found, left = set(), [Path(entry["file"])]
+    while left:
+        path = left.pop()
+        found.add(path)
+        candidates = [folder / name for name in included(path) for folder in (path.parent, *folders)]
+        left += [known for known in map(Path.resolve, candidates) if known not in found and known.is_file()]
+    return sorted(found)
+
+
+def scope_plugin():
+    """The plugin that keeps clang-tidy out of other libraries' headers."""
+    made = run("cmake", "--build", str(BUILD), "--target", "own_scope")
+    if made.returncode != 0:
+        sys.exit(made.stdout + made.stderr)
+    return BUILD / "tools/check/own_scope.so"
 
 
 def digest(entry, files):
     """Of all that decides what clang-tidy says of this source."""
     state = hashlib.sha256(entry["command"].encode())
-    for path in [*files, *sorted(TOP.glob("**/.clang-tidy"))]:
+    for path in [*files, SCOPE, *CONFIGURATIONS]:
         state.update(path.read_bytes())
     return state.hexdigest()
 
@@ -52,15 +71,15 @@ def changed_files():
     return {TOP / name for name in names}
 
 
-def tidy(entry, wanted):
+def tidy(entry, wanted, plugin):
     """(file, output) where clang-tidy complains; None where it passes or the source is not wanted."""
-    files = own_headers(entry)
+    files = own_files(entry)
     if wanted is not None and not wanted.intersection(files):
         return None
     mark = PASSED / digest(entry, files)
     if mark.exists():
         return None
-    done = run("clang-tidy-19", "--quiet", "-p", str(BUILD), entry["file"])
+    done = run("clang-tidy-19", f"--load={plugin}", "--quiet", "-p", str(BUILD), entry["file"])
     if done.returncode == 0:
         mark.touch()
         return None
@@ -82,9 +101,10 @@ def main():
     wanted = None if arguments.all else changed_files()
     if arguments.files:
         wanted = {Path(name).resolve() for name in arguments.files}
+    plugin = scope_plugin()
     with ThreadPoolExecutor(arguments.jobs) as pool:
         complaints = []
-        for found in pool.map(lambda entry: tidy(entry, wanted), sources):
+        for found in pool.map(lambda entry: tidy(entry, wanted, plugin), sources):
             if found:
                 complaints.append(found)
                 print(found[1], flush=True)
