@@ -1,0 +1,175 @@
+#include "legs/contact_filter.hpp"
+
+#include <cstddef>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
+
+#include "inertial/nav_state.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+int foothold_block(std::size_t leg) {
+  return ContactFilter::kFoothold + 3 * static_cast<int>(leg);
+}
+
+int foothold_block(Leg leg) {
+  return foothold_block(static_cast<std::size_t>(leg));
+}
+
+}  // namespace
+
+void ContactFilter::reset(const LeggedState& state, const Covariance& covariance) {
+  state_ = state;
+  P_ = covariance;
+}
+
+void ContactFilter::widen_velocity(double sigma_mps) {
+  P_.diagonal().segment<3>(kVelocity).array() += sigma_mps * sigma_mps;
+}
+
+void ContactFilter::propagate(const ImuSample& mean, double dt_s, const StepNoise& noise) {
+  const Vector3d rotation = (mean.gyro_radps - state_.bias_gyro) * dt_s;
+  const Eigen::Quaterniond q_middle = state_.q_odom_imu * so3::exp(0.5 * rotation);
+  const Vector3d a_odom = q_middle * (mean.accel_mps2 - state_.bias_accel) + gravity_down();
+  const Matrix3d R = q_middle.toRotationMatrix();
+
+  // The transition, exact to second order in dt.
+  Covariance F = Covariance::Identity();
+  F.block<3, 3>(kVelocity, kAttitude) = skew(gravity_down()) * dt_s;
+  F.block<3, 3>(kPosition, kAttitude) = 0.5 * skew(gravity_down()) * dt_s * dt_s;
+  F.block<3, 3>(kPosition, kVelocity) = Matrix3d::Identity() * dt_s;
+  F.block<3, 3>(kAttitude, kGyroBias) = -R * dt_s;
+  const Vector3d v_middle = state_.v_odom + 0.5 * a_odom * dt_s;
+  const Vector3d p_middle = state_.p_odom + 0.5 * v_middle * dt_s;
+  F.block<3, 3>(kVelocity, kGyroBias) =
+      -(skew(v_middle) * dt_s + 0.5 * skew(gravity_down()) * dt_s * dt_s) * R;
+  F.block<3, 3>(kPosition, kGyroBias) =
+      -(skew(p_middle) * dt_s + 0.5 * skew(v_middle) * dt_s * dt_s) * R;
+  F.block<3, 3>(kVelocity, kAccelBias) = -R * dt_s;
+  F.block<3, 3>(kPosition, kAccelBias) = -0.5 * R * dt_s * dt_s;
+  for (std::size_t leg = 0; leg < kLegCount; ++leg) {
+    F.block<3, 3>(foothold_block(leg), kGyroBias) = -skew(state_.footholds.at(leg)) * R * dt_s;
+  }
+  // Only attitude, velocity and biases drive others: F P F^T by those columns of F alone.
+  constexpr int kDrivers = 6;
+  const Covariance D = F - Covariance::Identity();
+  const auto driven = [&](const Covariance& P) -> Covariance {
+    return P + D.leftCols<kDrivers>() * P.topRows<kDrivers>() +
+           D.middleCols<kDrivers>(kGyroBias) * P.middleRows<kDrivers>(kGyroBias);
+  };
+  P_ = driven(driven(P_).transpose());
+
+  // The gyroscope's noise enters wherever its bias does; the accelerometer's as its bias.
+  const Eigen::Matrix<double, kErrorSize, 3> G_gyro = D.middleCols<3>(kGyroBias);
+  const Eigen::Matrix<double, kErrorSize, 3> G_accel = D.middleCols<3>(kAccelBias);
+  P_ += G_gyro * (noise.gyro * noise.gyro / dt_s) * G_gyro.transpose();
+  P_ += G_accel * (noise.accel * noise.accel / dt_s) * G_accel.transpose();
+  const auto add = [&](int block, const Vector3d& density) {
+    P_.diagonal().segment<3>(block) += density.cwiseAbs2() * dt_s;
+  };
+  add(kGyroBias, Vector3d::Constant(noise.gyro_walk));
+  add(kAccelBias, Vector3d::Constant(noise.accel_walk));
+  for (std::size_t leg = 0; leg < kLegCount; ++leg) {
+    add(foothold_block(leg), noise.foothold.at(leg));
+  }
+
+  state_.p_odom += v_middle * dt_s;
+  state_.v_odom += a_odom * dt_s;
+  state_.q_odom_imu = (state_.q_odom_imu * so3::exp(rotation)).normalized();
+}
+
+void ContactFilter::touch_down(Leg leg, const Vector3d& foot_in_imu, const Matrix3d& covariance) {
+  const Matrix3d R = state_.q_odom_imu.toRotationMatrix();
+  state_.footholds.at(static_cast<std::size_t>(leg)) = state_.p_odom + R * foot_in_imu;
+  const int block = foothold_block(leg);
+  P_.middleRows<3>(block) = P_.middleRows<3>(kPosition).eval();
+  P_.middleCols<3>(block) = P_.middleCols<3>(kPosition).eval();
+  P_.block<3, 3>(block, block) += R * covariance * R.transpose();
+}
+
+void ContactFilter::roll(Leg leg, const Vector3d& displacement) {
+  state_.footholds.at(static_cast<std::size_t>(leg)) += displacement;
+}
+
+double ContactFilter::update_foothold(Leg leg, const Vector3d& foot_in_imu,
+                                      const Matrix3d& covariance, double gate) {
+  const Matrix3d R = state_.q_odom_imu.toRotationMatrix();
+  const Vector3d innovation =
+      R * foot_in_imu + state_.p_odom - state_.footholds.at(static_cast<std::size_t>(leg));
+  Gain H = Gain::Zero();
+  H.block<3, 3>(0, kPosition) = -Matrix3d::Identity();
+  H.block<3, 3>(0, foothold_block(leg)) = Matrix3d::Identity();
+  return correct(H, innovation, R * covariance * R.transpose(), gate);
+}
+
+double ContactFilter::update_velocity(const Vector3d& v_imu, const Matrix3d& covariance,
+                                      double gate) {
+  const Matrix3d R = state_.q_odom_imu.toRotationMatrix();
+  Gain H = Gain::Zero();
+  H.block<3, 3>(0, kVelocity) = Matrix3d::Identity();
+  return correct(H, R * v_imu - state_.v_odom, R * covariance * R.transpose(), gate);
+}
+
+double ContactFilter::update_gyro_bias(const Vector3d& gyro_radps, const Matrix3d& covariance) {
+  Gain H = Gain::Zero();
+  H.block<3, 3>(0, kGyroBias) = Matrix3d::Identity();
+  return correct(H, gyro_radps - state_.bias_gyro, covariance,
+                 std::numeric_limits<double>::infinity());
+}
+
+double ContactFilter::correct(const Gain& H, const Vector3d& innovation, const Matrix3d& noise,
+                              double gate) {
+  const Eigen::Matrix<double, kErrorSize, 3> PHt = P_ * H.transpose();
+  const Matrix3d S = H * PHt + noise;
+  const Matrix3d S_inverse = S.inverse();
+  const double nis = innovation.dot(S_inverse * innovation);
+  // Written so that NaN is refused as well.
+  if (!(nis <= gate)) {
+    return nis;
+  }
+  const Eigen::Matrix<double, kErrorSize, 3> K = PHt * S_inverse;
+  const Eigen::Matrix<double, kErrorSize, 1> delta = K * innovation;
+  P_ -= K * PHt.transpose();
+  P_ = (0.5 * (P_ + P_.transpose())).eval();
+
+  const Vector3d phi = delta.segment<3>(kAttitude);
+  const Eigen::Quaterniond rotation = so3::exp(phi);
+  // The group's exponential: its translations pass through SO(3)'s left Jacobian.
+  const Matrix3d V = so3::right_jacobian(-phi);
+  const auto moved = [&](const Vector3d& x, int block) {
+    return Vector3d{rotation * x + V * delta.segment<3>(block)};
+  };
+  state_.q_odom_imu = (rotation * state_.q_odom_imu).normalized();
+  state_.v_odom = moved(state_.v_odom, kVelocity);
+  state_.p_odom = moved(state_.p_odom, kPosition);
+  for (std::size_t leg = 0; leg < kLegCount; ++leg) {
+    state_.footholds.at(leg) = moved(state_.footholds.at(leg), foothold_block(leg));
+  }
+  state_.bias_gyro += delta.segment<3>(kGyroBias);
+  state_.bias_accel += delta.segment<3>(kAccelBias);
+  return nis;
+}
+
+Matrix6d ContactFilter::pose_covariance() const {
+  // phi = R^T delta_R, rho = R^T (delta_p - p x delta_R): see the error's definition.
+  const Matrix3d Rt = state_.q_odom_imu.toRotationMatrix().transpose();
+  Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
+  J.block<3, 3>(0, kAttitude) = Rt;
+  J.block<3, 3>(3, kAttitude) = -Rt * skew(state_.p_odom);
+  J.block<3, 3>(3, kPosition) = Rt;
+  return J * P_.topLeftCorner<9, 9>() * J.transpose();
+}
+
+Matrix3d ContactFilter::velocity_covariance() const {
+  Eigen::Matrix<double, 3, 6> J;
+  J << -skew(state_.v_odom), Matrix3d::Identity();
+  return J * P_.topLeftCorner<6, 6>() * J.transpose();
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cmath>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/leg_kinematics.hpp"
+
+namespace geoflow::slam {
+
+// NOLINTBEGIN(readability-magic-numbers): each default is named, and given its unit, by its member
+
+/// What a leg's encoders and its foot on the ground do besides what the kinematics say.
+struct LegNoise {
+  /// Of a joint's angle: twice the step in which a Go2's motors report it, for backlash [rad].
+  double q_rad = 1e-3;
+  /// Of the joints' rates: a real Go2 standing still, hip, thigh, calf [rad/s].
+  Vector3d dq_radps{0.03, 0.05, 0.02};
+  /// Of the point of contact: flexing links, a foot that is no sphere [m].
+  double point_m = 1e-3;
+  /// Creep of a foot that stands: random walk of its place along the ground, and across it, where
+  /// the ground holds it [m/sqrt(s)].
+  double creep = 1e-2;
+  double sinking = 2e-3;
+  /// The same right after touchdown, while foot and joints give way and the sole slides into place,
+  /// fading with `settling_s`: a real Go1's foot moves by 1 to 2 cm [m/sqrt(s)].
+  double settling = 0.15;
+  double settling_s = 0.04;  ///< [s]
+  /// Error of a standing foot's velocity that lasts for `speed_memory_s`: the ground gives way, the
+  /// foot rolls otherwise than thought [m/s].
+  double speed_mps = 0.02;
+  double speed_memory_s = 0.1;  ///< [s]
+  /// Error of lengths, radius and timing that does not average out, as a share of the way [1].
+  double scale = 0.01;
+
+  /// Random walk of a foot's place after it has stood for `stance_s`, x, y and z [m/sqrt(s)].
+  [[nodiscard]] Vector3d creep_after(double stance_s) const noexcept {
+    const double settles = settling * std::exp(-stance_s / settling_s);
+    return {creep + settles, creep + settles, sinking + settles};
+  }
+  /// Standard deviation of its speed then, independent from sample to sample [m/s].
+  [[nodiscard]] double speed_after(double stance_s) const noexcept {
+    return speed_mps + settling / std::sqrt(settling_s) * std::exp(-stance_s / settling_s);
+  }
+};
+
+/// How a robot's legs are to be understood.
+struct LegConfig {
+  LegGeometry geometry = kGo2Legs;
+  /// Share of the foot's geometric radius on which it rolls: 1 for a hard sphere, 0 for a foot that
+  /// is pinned to the ground. Calibrated.
+  double rolling = 1;
+  SE3 T_base_imu;
+  LegNoise noise;
+  ImuNoise imu_noise;
+  /// What a walking body's shocks and the mounting's vibration add to the accelerometer's noise
+  /// density [m/s^2/sqrt(Hz)]. Source: Cerberus trusts it with 0.9 m/s^2 at 400 Hz.
+  double shock_density = 0.045;
+};
+
+// NOLINTEND(readability-magic-numbers)
+
+}  // namespace geoflow::slam

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
+
+#include "inertial/initialiser.hpp"
+#include "inertial/nav_state.hpp"
+#include "legs/contact.hpp"
+#include "legs/contact_filter.hpp"
+#include "legs/foot_motion.hpp"
+#include "legs/imu_track.hpp"
+#include "legs/leg_config.hpp"
+#include "legs/stance_velocity.hpp"
+#include "legs/standing.hpp"
+
+namespace geoflow::slam {
+
+/// How the measurements of the time since the previous estimate agreed with the prediction. For a
+/// healthy IMU and feet that stand, `nis` is about 1.
+struct LegHealth {
+  double nis = 0;                ///< mean normalised innovation squared per degree of freedom [1]
+  std::uint32_t updates = 0;     ///< measurements taken
+  std::uint32_t refused = 0;     ///< that contradicted the prediction: slips, shocks, IMU faults
+  std::uint32_t duplicates = 0;  ///< leg samples that repeated the one before
+  double contact_s = 0;          ///< time with at least one standing foot [s]
+};
+
+/// Where legs and IMU alone think the robot is.
+struct LegEstimate {
+  HostTime t;
+  SE3 T_odom_base;  ///< odom: base at the start, levelled
+  /// Of the pose, as in hal/geometry.hpp, with the error that grows with the way (LegNoise::scale).
+  Matrix6d covariance = Matrix6d::Zero();
+  VelocityBelief velocity;
+  ImuBias bias;
+  ContactEstimator::Feet feet{};
+  StanceVelocity stance;  ///< at the newest leg sample
+  bool still = false;
+  LegHealth health;
+};
+
+/// Dead reckoning by IMU and legs: the estimate when the camera is blind, and the judge of the IMU.
+///
+/// It starts by itself once the robot has stood (or lain) still for a second; one that is already
+/// moving is started after `kPatience` from the mean specific force, with the uncertainty that this
+/// deserves. Between leg samples the contact filter integrates the IMU; at each it decides which
+/// feet stand, and their places correct it. A foot whose place contradicts the prediction starts a
+/// new foothold. Deterministic; thread-compatible.
+class LegOdometry {
+ public:
+  explicit LegOdometry(const LegConfig& config, const BiasPrior& bias = BiasPrior::cold());
+
+  /// Takes samples, in order of time; those known already (packets overlap) are ignored. Moves on
+  /// to `t`, using samples up to it and interpolating the IMU with the one behind; later ones are
+  /// kept for the next call. None as long as it is not started.
+  std::optional<LegEstimate> add(std::span<const Timed<ImuSample>> imu,
+                                 std::span<const Timed<LegSample>> legs, HostTime t);
+
+  /// Starts from a known state at `fix.t`, whatever it was before.
+  void start(const StandingFix& fix);
+
+  [[nodiscard]] bool started() const noexcept { return started_; }
+
+ private:
+  /// One foot's orientation in odom when it was last seen to stand, for how far it has rolled
+  /// since.
+  using CalfRotations = std::array<std::optional<Matrix3d>, kLegCount>;
+
+  void try_start(HostTime t);
+  void advance(HostTime t);
+  void take(const Timed<LegSample>& legs);
+  [[nodiscard]] FootMotions motions(const LegSample& legs, const BaseTurn& turn) const;
+  [[nodiscard]] std::array<std::optional<FootEvidence>, kLegCount> evidence(
+      const LegSample& legs, const FootMotions& motions, const BaseTurn& turn);
+  void update_feet(const FootMotions& motions);
+  void update_foot(Leg leg, const FootMotion& motion);
+  void rest(HostTime t);
+  void count(double nis);
+  [[nodiscard]] BaseTurn turn_at(HostTime t) const;
+  [[nodiscard]] VelocityBelief base_velocity(const BaseTurn& turn) const;
+  [[nodiscard]] Matrix3d R_odom_base() const;
+  [[nodiscard]] LegEstimate estimate(HostTime t);
+
+  LegConfig config_;
+  SE3 T_imu_base_;
+  BiasPrior prior_;
+  StandingInitialiser initialiser_;
+  StillnessDetector stillness_;
+  ContactEstimator contact_;
+  StanceVelocityEstimator stance_estimator_;
+  ContactFilter filter_;
+  ImuTrack imu_;
+  std::deque<Timed<LegSample>> pending_;
+
+  bool started_ = false;
+  std::optional<HostTime> t_first_;
+  HostTime t_;
+  std::optional<Timed<LegSample>> last_legs_;
+  std::optional<HostTime> t_newest_legs_;
+  std::optional<HostTime> t_rest_;
+  CalfRotations R_odom_calf_;
+  ContactFilter::StepNoise step_noise_;
+  bool torques_seen_ = false;
+  bool still_ = false;
+  StanceVelocity stance_;
+  LegHealth health_;
+};
+
+}  // namespace geoflow::slam
