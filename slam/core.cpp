@@ -23,9 +23,8 @@
 namespace geoflow::slam {
 namespace {
 
-/// Shares of a frame's depth that have to agree with the map to be a fix by themselves.
+/// Share of a frame's depth that has to agree with the map to be a fix by itself.
 constexpr double kDepthCarriesOn = 0.5;
-constexpr double kDepthBegins = 0.7;
 /// A frame that follows from the one before but has not been found in the map for so long begins a
 /// new part of it, tied to the old one by nothing but what was dead-reckoned in between.
 constexpr int kLostFrames = 15;
@@ -90,7 +89,7 @@ class Core::Impl {
   PoseEstimate start(const SyncedPacket& packet) {
     Frame& frame = tracker_.current();
     frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
-    motion_.update(packet.t, frame.T_odom_cam, false);
+    motion_.update(packet.t, frame.T_odom_cam, true);
     insert_keyframe(Matrix6d::Zero());
     records_.push_back({packet.t, reference_, SE3{}});
     PoseEstimate estimate = estimate_at(packet, frame.T_odom_cam);
@@ -103,30 +102,26 @@ class Core::Impl {
   PoseEstimate follow(const SyncedPacket& packet) {
     const TrackingResult result = tracker_.track(map_, motion_);
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
-    // Depth alone may look alike elsewhere, so to begin a track it has to fit better than to carry
-    // one on.
-    const double enough_depth =
-        last_.status == TrackingStatus::kTracking ? kDepthCarriesOn : kDepthBegins;
-    const bool depth_fix = result.depth_share > enough_depth;
-    const bool fixed = result.visual_fix || depth_fix;
-    motion_.update(packet.t, T_odom_cam, fixed);
-
-    PoseEstimate estimate = estimate_at(packet, T_odom_cam);
-    estimate.source = result.source;
-    estimate.visual_inliers = result.solution.visual_inliers;
-    estimate.depth_inliers = result.solution.depth_inliers;
-    const Matrix6d covariance = covariance_in_odom(T_odom_cam, result.solution.information);
-    const Matrix6d A = T_base_cam_.adjoint();
-    estimate.covariance = A * covariance * A.transpose();
-    estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
-    estimate.quality = quality(result);
-
+    const bool depth_fix = result.depth_share > kDepthCarriesOn;
+    const bool fixed = result.anchored && (result.visual_fix || depth_fix);
     frames_lost_ = fixed ? 0 : frames_lost_ + 1;
     const bool begin_anew = frames_lost_ > kLostFrames && result.sure;
     if (begin_anew) {
       ++reset_counter_;
       frames_lost_ = 0;
+      tracker_.current().anchored = true;
     }
+    motion_.update(packet.t, T_odom_cam, result.sure || fixed);
+
+    PoseEstimate estimate = estimate_at(packet, T_odom_cam);
+    estimate.source = result.source;
+    estimate.visual_inliers = result.solution.visual_inliers;
+    estimate.depth_inliers = result.solution.depth_inliers;
+    const Matrix6d covariance = covariance_in_odom(T_odom_cam, result);
+    const Matrix6d A = T_base_cam_.adjoint();
+    estimate.covariance = A * covariance * A.transpose();
+    estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
+    estimate.quality = quality(result);
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       insert_keyframe(covariance);
     }
@@ -166,12 +161,19 @@ class Core::Impl {
   }
 
   /// Covariance of T_odom_cam: that of the reference keyframe, carried to this frame, plus that of
-  /// the registration.
-  Matrix6d covariance_in_odom(const SE3& T_odom_cam, const Matrix6d& information) const {
+  /// what ties the frame to it: one registration, or, since the thread was lost, all steps in turn.
+  Matrix6d covariance_in_odom(const SE3& T_odom_cam, const TrackingResult& result) {
     const Keyframe& reference = map_.keyframe(reference_);
     const Matrix6d A = (T_odom_cam.inverse() * reference.T_odom_cam).adjoint();
-    return A * reference.covariance * A.transpose() +
-           information.ldlt().solve(Matrix6d::Identity());
+    if (result.anchored) {
+      drift_.setZero();
+    } else {
+      const Matrix6d A_step = (T_odom_cam.inverse() * T_odom_cam_).adjoint();
+      drift_ = A_step * drift_ * A_step.transpose();
+    }
+    drift_ += result.covariance;
+    T_odom_cam_ = T_odom_cam;
+    return A * reference.covariance * A.transpose() + drift_;
   }
 
   static std::uint8_t quality(const TrackingResult& result) {
@@ -215,6 +217,8 @@ class Core::Impl {
   std::optional<KeyframeId> pending_;
   std::vector<FrameRecord> records_;
   PoseEstimate last_;
+  SE3 T_odom_cam_;                     ///< of the last frame
+  Matrix6d drift_ = Matrix6d::Zero();  ///< of the last frame in respect of the map
   int frames_lost_ = 0;
   std::uint32_t reset_counter_ = 0;
   StageObserver* observer_;

@@ -52,11 +52,11 @@ void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) 
 // key here does not compile.
 
 void bind_features(slam::FeatureConfig& c, std::vector<Key>& keys) {
-  auto& [cell_px, per_cell, threshold, minimum, mask_radius_px] = c;
+  auto& [cell_px, per_cell, described, threshold, mask_radius_px] = c;
   keys.push_back({"slam.features.cell_px", &cell_px, 8, 200});
   keys.push_back({"slam.features.features_per_cell", &per_cell, 1, 20});
+  keys.push_back({"slam.features.described_per_cell", &described, 1, 20});
   keys.push_back({"slam.features.fast_threshold", &threshold, 1, 200});
-  keys.push_back({"slam.features.fast_threshold_minimum", &minimum, 1, 200});
   keys.push_back({"slam.features.mask_radius_px", &mask_radius_px, 0, 100});
 }
 

@@ -46,11 +46,14 @@ void Map::remove_observation(PointId id, KeyframeId keyframe) {
   }
 }
 
-void Map::keep_newest_clouds(std::size_t count) {
-  std::size_t kept = 0;
-  for (auto it = keyframes_.rbegin(); it != keyframes_.rend(); ++it) {
-    if (it->second.cloud && ++kept > count) {
+void Map::keep_newest(std::size_t clouds, std::size_t pyramids) {
+  std::size_t age = 0;
+  for (auto it = keyframes_.rbegin(); it != keyframes_.rend(); ++it, ++age) {
+    if (age >= clouds) {
       it->second.cloud.reset();
+    }
+    if (age >= pyramids) {
+      it->second.pyramid.reset();
     }
   }
 }

@@ -15,6 +15,9 @@
 /// What has been seen, and from where. Value types, thread-compatible; odom is the map's frame.
 namespace geoflow::slam {
 
+class ImagePyramid;
+struct PlaceView;
+
 enum class KeyframeId : std::uint32_t {};
 enum class PointId : std::uint32_t {};
 
@@ -48,7 +51,9 @@ struct Keyframe {
   SE3 T_odom_cam;
   Matrix6d covariance = Matrix6d::Zero();   ///< of T_odom_cam
   std::shared_ptr<const DepthCloud> cloud;  ///< null where the frame had no depth or it was let go
-  std::vector<PointId> points;              ///< that it observes
+  std::shared_ptr<const PlaceView> place;   ///< never null
+  std::shared_ptr<const ImagePyramid> pyramid;  ///< null where it was let go
+  std::vector<PointId> points;                  ///< that it observes
 };
 
 /// Keyframes, points and depth edges. Iterates in order of id, so that the same input gives the
@@ -64,8 +69,9 @@ class Map {
   void remove_point(PointId id);
   /// Forgets one observation; a point left with none goes too.
   void remove_observation(PointId id, KeyframeId keyframe);
-  /// Lets go of the depth of all but the newest `count` keyframes: what bounds the memory.
-  void keep_newest_clouds(std::size_t count);
+  /// Lets go of the depth and the images of all but so many newest keyframes: what bounds the
+  /// memory.
+  void keep_newest(std::size_t clouds, std::size_t pyramids);
 
   [[nodiscard]] const std::map<KeyframeId, Keyframe>& keyframes() const noexcept {
     return keyframes_;

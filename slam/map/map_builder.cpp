@@ -14,16 +14,18 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/mapping.hpp"
 
+#include "cloud/pixel_depth.hpp"
 #include "map/overlap.hpp"
+#include "map/point_search.hpp"
+#include "vision/place_view.hpp"
 
 namespace geoflow::slam {
 namespace {
 
 constexpr double kEdgeOverlap =
     0.4;  ///< keyframes that share at least this much of their depth are registered
-constexpr double kConsistentDepth =
-    0.05;  ///< relative difference within which a point found again is the same
-constexpr std::size_t kCloudsKept = 300;  ///< keyframes whose depth stays in memory
+constexpr std::size_t kCloudsKept = 300;   ///< keyframes whose depth stays in memory
+constexpr std::size_t kPyramidsKept = 30;  ///< keyframes whose image does, at 2 MB each
 
 /// The point nearest to two rays; none where they are nearly parallel or meet behind a camera.
 std::optional<Vector3d> intersect(const Vector3d& origin_a, const Vector3d& ray_a,
@@ -55,14 +57,20 @@ MapBuilder::MapBuilder(const Config& config, const GicpConfig& gicp, const Calib
 
 KeyframeId MapBuilder::insert(Map& map, Frame& frame, const Matrix6d& covariance) {
   cull(map, frame);
+  if (!frame.place) {
+    const StageScope scope{observer_, Stage::kFeatures};
+    frame.place = describe_place(frame.pyramid->image(), frame.depth, depth_unit_m_, camera_, orb_);
+  }
   const KeyframeId id = map.add_keyframe({.t = frame.t,
                                           .T_odom_cam = frame.T_odom_cam,
                                           .covariance = covariance,
                                           .cloud = frame.cloud,
+                                          .place = frame.place,
+                                          .pyramid = frame.pyramid,
                                           .points = {}});
   observe_features(map, id, frame);
   add_features(map, id, frame);
-  map.keep_newest_clouds(kCloudsKept);
+  map.keep_newest(kCloudsKept, kPyramidsKept);
   return id;
 }
 
@@ -121,57 +129,27 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   constexpr double kSearchRadiusPx = 8;
   const StageScope scope{observer_, Stage::kFeatures};
   std::vector<Vector2d> taken;
-  std::set<PointId> present;
   for (const Feature& feature : frame.features) {
     taken.push_back(feature.raw);
-    if (feature.point) {
-      present.insert(*feature.point);
-    }
   }
-  std::vector<PointId> points;
-  std::vector<double> depths;
-  std::vector<ExpectedFeature> expected;
-  const SE3 T_cam_odom = frame.T_odom_cam.inverse();
-  if (frame.cloud) {
-    for (const auto& [id, share] :
-         overlapping_keyframes(map, *frame.cloud, frame.T_odom_cam, kEdgeOverlap)) {
-      for (const PointId candidate : map.keyframe(id).points) {
-        const MapPoint& point = *map.find_point(candidate);
-        const Vector3d p_cam = T_cam_odom * point.p_odom;
-        if (p_cam.z() <= 0 || !present.insert(candidate).second) {
-          continue;
-        }
-        const Vector2d raw = camera_.distort(camera_.project(p_cam));
-        if (camera_.contains(raw, 0)) {
-          points.push_back(candidate);
-          depths.push_back(p_cam.z());
-          expected.push_back({raw, point.descriptor});
-        }
-      }
-    }
+  std::vector<Feature> added;
+  const cv::Size image = frame.pyramid->image().size();
+  for (const OrbFeature& feature :
+       choose_new(frame.place->features, taken, image, config_.features)) {
+    added.push_back({.raw = feature.pixel,
+                     .ideal = camera_.undistort(feature.pixel),
+                     .depth_m = depth_at(frame.depth, feature.pixel, depth_unit_m_),
+                     .descriptor = feature.descriptor});
   }
-  const std::vector<OrbFeature> found = orb_.extract(frame.pyramid.image(), taken);
-  const std::vector<int> match = match_by_projection(expected, found, kSearchRadiusPx);
-  std::vector<std::size_t> expected_of_feature(found.size(), expected.size());
-  for (std::size_t i = 0; i < match.size(); ++i) {
-    if (match[i] >= 0) {
-      expected_of_feature[static_cast<std::size_t>(match[i])] = i;
-    }
-  }
-  for (std::size_t j = 0; j < found.size(); ++j) {
-    Feature feature{.raw = found[j].pixel,
-                    .ideal = camera_.undistort(found[j].pixel),
-                    .depth_m = depth_at(frame.depth, found[j].pixel, depth_unit_m_),
-                    .descriptor = found[j].descriptor};
-    const std::size_t i = expected_of_feature[j];
-    if (i < expected.size() &&
-        std::abs(feature.depth_m - depths[i]) < kConsistentDepth * depths[i]) {
-      feature.point = points[i];
-      map.observe(points[i], {keyframe, feature.ideal, feature.depth_m});
+  const auto points = find_points(map, frame, added, kSearchRadiusPx, camera_);
+  for (std::size_t j = 0; j < added.size(); ++j) {
+    added[j].point = points[j];
+    if (points[j]) {
+      map.observe(*points[j], {keyframe, added[j].ideal, added[j].depth_m});
     } else {
-      triangulate(map, keyframe, feature);
+      triangulate(map, keyframe, added[j]);
     }
-    frame.features.push_back(feature);
+    frame.features.push_back(added[j]);
   }
 }
 

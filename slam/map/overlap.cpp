@@ -22,11 +22,22 @@ constexpr std::size_t kSamples = 100;
 constexpr float kDepthTolerance =
     0.05F;  ///< relative difference of depth within which two surfaces are one
 
-double overlap(const std::vector<Eigen::Vector3f>& samples, const DepthCloud& target,
-               const SE3& T_target_source) {
+/// Surfels spread over the cloud, for a quick comparison.
+std::vector<Eigen::Vector3f> sample(const DepthCloud& cloud) {
+  std::vector<Eigen::Vector3f> samples;
+  const std::size_t step = std::max<std::size_t>(1, cloud.size() / kSamples);
+  for (std::size_t i = step / 2; i < cloud.size(); i += step) {
+    samples.push_back(cloud.surfels()[cloud.valid()[i]].point);
+  }
+  return samples;
+}
+
+DepthAgreement agreement(const std::vector<Eigen::Vector3f>& samples, const DepthCloud& target,
+                         const SE3& T_target_source) {
   const Eigen::Matrix3f R = T_target_source.rotation_matrix().cast<float>();
   const Eigen::Vector3f t = T_target_source.translation().cast<float>();
   std::size_t seen = 0;
+  std::size_t agreeing = 0;
   for (const Eigen::Vector3f& sample : samples) {
     const Eigen::Vector3f p = R * sample + t;
     const std::optional<Eigen::Vector2i> cell = target.grid().project(p);
@@ -35,39 +46,40 @@ double overlap(const std::vector<Eigen::Vector3f>& samples, const DepthCloud& ta
     }
     const auto index = static_cast<std::size_t>(cell->y() * target.grid().columns() + cell->x());
     const Surfel& surfel = target.surfels()[index];
-    if (surfel.valid() && std::abs(surfel.point.z() - p.z()) < kDepthTolerance * p.z()) {
+    if (surfel.valid()) {
       ++seen;
+      agreeing += std::abs(surfel.point.z() - p.z()) < kDepthTolerance * p.z() ? 1U : 0U;
     }
   }
-  return static_cast<double>(seen) / static_cast<double>(samples.size());
+  const double all = std::max(1.0, static_cast<double>(samples.size()));
+  return {static_cast<double>(seen) / all, static_cast<double>(agreeing) / all};
 }
 
 }  // namespace
 
+DepthAgreement depth_agreement(const DepthCloud& source, const DepthCloud& target,
+                               const SE3& T_target_source) {
+  return agreement(sample(source), target, T_target_source);
+}
+
 std::vector<OverlappingKeyframe> overlapping_keyframes(const Map& map, const DepthCloud& cloud,
                                                        const SE3& T_odom_cam,
                                                        double least_overlap) {
-  std::vector<Eigen::Vector3f> samples;
-  const std::size_t step = std::max<std::size_t>(1, cloud.size() / kSamples);
-  for (std::size_t i = step / 2; i < cloud.size(); i += step) {
-    samples.push_back(cloud.surfels()[cloud.valid()[i]].point);
-  }
+  const std::vector<Eigen::Vector3f> samples = sample(cloud);
   std::vector<OverlappingKeyframe> found;
-  if (samples.empty()) {
-    return found;
-  }
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (!keyframe.cloud) {
       continue;
     }
     const double share =
-        overlap(samples, *keyframe.cloud, keyframe.T_odom_cam.inverse() * T_odom_cam);
+        agreement(samples, *keyframe.cloud, keyframe.T_odom_cam.inverse() * T_odom_cam).agreeing;
     if (share >= least_overlap) {
       found.push_back({id, share});
     }
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const auto& a, const auto& b) { return a.overlap > b.overlap; });
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+    return a.overlap > b.overlap || (a.overlap == b.overlap && a.id < b.id);
+  });
   return found;
 }
 

@@ -9,6 +9,16 @@
 
 namespace geoflow::slam {
 
+/// How the depth of two views goes together, as shares of the first one's surfels.
+struct DepthAgreement {
+  double seen = 0;      ///< that fall on a surfel of the second view
+  double agreeing = 0;  ///< of all, those that lie on its surface
+};
+
+/// Of about 100 surfels spread over `source`, at a given pose in the view of `target`.
+[[nodiscard]] DepthAgreement depth_agreement(const DepthCloud& source, const DepthCloud& target,
+                                             const SE3& T_target_source);
+
 struct OverlappingKeyframe {
   KeyframeId id;
   double overlap;  ///< share of the frame's depth that the keyframe sees at the same place, 0 to 1

@@ -11,6 +11,7 @@
 #include "cloud/depth_cloud.hpp"
 #include "map/map.hpp"
 #include "vision/image_pyramid.hpp"
+#include "vision/place_view.hpp"
 
 namespace geoflow::slam {
 
@@ -33,16 +34,14 @@ struct Feature {
 /// What is kept of a frame until the next one has been tracked.
 struct Frame {
   HostTime t;
-  ImagePyramid pyramid;
-  FrameRef depth;                           ///< empty: none
-  std::shared_ptr<const DepthCloud> cloud;  ///< null: none
+  std::shared_ptr<const ImagePyramid> pyramid;  ///< null in a frame that was never read
+  FrameRef depth;                               ///< empty: none
+  std::shared_ptr<const DepthCloud> cloud;      ///< null: none
   std::vector<Feature> features;
+  std::shared_ptr<const PlaceView> place;  ///< null until it is asked for
   SE3 T_odom_cam;
+  /// Whether the pose hangs together with the map; otherwise it only follows from earlier frames.
+  bool anchored = true;
 };
-
-/// Depth [m] at a raw pixel: the median of its 3 x 3 neighbourhood; 0 where fewer than five pixels
-/// have a measurement or they spread over a depth discontinuity (more than 5 %), where one pixel's
-/// depth belongs to either side.
-[[nodiscard]] double depth_at(const FrameRef& depth, const Vector2d& raw, double depth_unit_m);
 
 }  // namespace geoflow::slam

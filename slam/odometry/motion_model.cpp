@@ -14,17 +14,22 @@ namespace {
 constexpr double kAcceleration = 5.0;          // [m/s^2]
 constexpr double kAngularAcceleration = 20.0;  // [rad/s^2]
 constexpr double kMemory = 0.1;                // [s]
+/// In this time the acceleration above moves the image further than Lucas-Kanade reaches: 0.4 rad,
+/// or 0.1 m.
+constexpr double kBlind = 0.2;      // [s]
+constexpr double kShortest = 1e-3;  // [s]
 
 }  // namespace
 
-void MotionModel::update(HostTime t, const SE3& T_odom_cam, bool trusted) {
+void MotionModel::update(HostTime t, const SE3& T_odom_cam, bool followed) {
   const double dt = to_seconds(t - t_);
-  if (trusted && dt > 0 && dt < kMemory * 2) {
+  if (followed && dt > 0 && dt < kMemory * 2) {
     velocity_ = (T_odom_cam_.inverse() * T_odom_cam).log() / dt;
   } else {
     velocity_ *= std::exp(-std::max(0.0, dt) / kMemory);
   }
   t_ = t;
+  t_followed_ = followed ? t : t_followed_;
   T_odom_cam_ = T_odom_cam;
 }
 
@@ -38,8 +43,12 @@ SE3 MotionModel::motion_over(Duration duration) const {
   return SE3::exp(travelled * velocity_);
 }
 
+bool MotionModel::blind(HostTime t) const {
+  return to_seconds(t - t_followed_) > kBlind;
+}
+
 PosePrior MotionModel::predict(HostTime t) const {
-  const double dt = std::max(1e-3, to_seconds(t - t_));
+  const double dt = std::max(kShortest, to_seconds(t - t_followed_));
   const double sigma_rotation = 0.5 * kAngularAcceleration * dt * dt;
   const double sigma_translation = 0.5 * kAcceleration * dt * dt;
   Vector6d sigma;

@@ -13,13 +13,17 @@ namespace geoflow::slam {
 /// IV-B), and the prior that holds directions in which nothing is seen. Thread-compatible.
 class MotionModel {
  public:
-  /// Takes over a tracked pose. `trusted`: whether something was seen that fixes it; if not, the
-  /// velocity is kept.
-  void update(HostTime t, const SE3& T_odom_cam, bool trusted);
+  /// Takes over a tracked pose. `followed`: whether it follows from the one before by something
+  /// seen; if not, the velocity fades.
+  void update(HostTime t, const SE3& T_odom_cam, bool followed);
 
   /// The pose expected at `t` with its information. Beyond kMemory the velocity says nothing any
   /// more and fades: after a gap the camera is as likely to have stopped.
   [[nodiscard]] PosePrior predict(HostTime t) const;
+
+  /// Whether at `t` no pose has followed from another for so long that the prediction is no start
+  /// for following features.
+  [[nodiscard]] bool blind(HostTime t) const;
 
   /// The pose of the camera at a time near the last update, by its velocity.
   [[nodiscard]] SE3 motion_over(Duration duration) const;
@@ -32,6 +36,7 @@ class MotionModel {
 
  private:
   HostTime t_;
+  HostTime t_followed_;  ///< of the last update that followed
   SE3 T_odom_cam_;
   Vector6d velocity_ = Vector6d::Zero();
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "geoflow/hal/geometry.hpp"
 
@@ -30,11 +31,19 @@ Eigen::Matrix<double, 3, 6> camera_point_jacobian(const Vector3d& q) {
   return J;
 }
 
+/// H - N as far as it is positive semidefinite.
+Matrix6d without_noise(const Matrix6d& H, const Matrix6d& N) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver{H - N};
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() *
+         solver.eigenvectors().transpose();
+}
+
 }  // namespace
 
 struct PoseOptimiser::System {
   Matrix6d visual = Matrix6d::Zero();
   Matrix6d depth = Matrix6d::Zero();
+  Matrix6d depth_noise = Matrix6d::Zero();  ///< the part of `depth` that is feigned
   Vector6d gradient = Vector6d::Zero();
   std::uint32_t depth_inliers = 0;
 };
@@ -91,6 +100,7 @@ void PoseOptimiser::add_depth(const PoseProblem& problem, std::span<const Surfel
         linearise(*problem.cloud, sample, *target.cloud, T_target_cam, gicp_);
     const double share = 1.0 / static_cast<double>(problem.targets.size());
     system.depth += share * equations.H;
+    system.depth_noise += share * equations.H_noise;
     system.gradient += share * equations.b;
     system.depth_inliers =
         std::max(system.depth_inliers, static_cast<std::uint32_t>(equations.inliers));
@@ -116,6 +126,14 @@ void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
   }
 }
 
+Matrix6d PoseOptimiser::covariance(const System& system, const Matrix6d& prior) const {
+  const Matrix6d depth = without_noise(system.depth, system.depth_noise);
+  const Matrix6d H = system.visual + depth + prior;
+  const Matrix6d B = system.visual + gicp_.covariance_inflation * depth + prior;
+  const Eigen::LDLT<Matrix6d> solver{H};
+  return solver.solve(solver.solve(B).transpose());
+}
+
 PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) const {
   constexpr double kConverged = 1e-5;  // [rad], [m]
   PoseSolution solution;
@@ -132,9 +150,10 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) 
     add_depth(problem, sample, solution.T_odom_cam, system);
     const Vector6d from_prior = (problem.prior.T_odom_cam.inverse() * solution.T_odom_cam).log();
     system.gradient += problem.prior.information * from_prior;
-    solution.information = system.visual + system.depth + problem.prior.information;
+    const Matrix6d H = system.visual + system.depth + problem.prior.information;
+    solution.covariance = covariance(system, problem.prior.information);
     solution.depth_inliers = system.depth_inliers;
-    const Vector6d step = -solution.information.ldlt().solve(system.gradient);
+    const Vector6d step = -H.ldlt().solve(system.gradient);
     if (!step.allFinite()) {
       break;
     }

@@ -43,8 +43,8 @@ struct PoseProblem {
 
 struct PoseSolution {
   SE3 T_odom_cam;
-  Matrix6d information = Matrix6d::Zero();  ///< of all terms at the solution, right perturbation
-  std::vector<bool> inlier;                 ///< of each visual match
+  Matrix6d covariance = Matrix6d::Zero();  ///< of a right perturbation
+  std::vector<bool> inlier;                ///< of each visual match
   std::uint32_t visual_inliers = 0;
   std::uint32_t depth_inliers =
       0;  ///< of depth_surfels, the largest number that pairs with one target
@@ -60,6 +60,11 @@ struct PoseSolution {
 /// The visual standard deviation is estimated from the residuals themselves in every step (median),
 /// never below PoseConfig::pixel_sigma: a camera whose colour does not fit its depth thereby yields
 /// to the depth, without a switch.
+///
+/// The covariance is H^-1 B H^-1 (White, "Maximum likelihood estimation of misspecified models",
+/// 1982): H as the terms are weighted, B the covariance of the gradient as it is known to be.
+/// Errors that residuals share make B larger than H: GicpConfig::covariance_inflation for depth.
+/// What the normals' noise feigns is in neither.
 class PoseOptimiser {
  public:
   PoseOptimiser(const PoseConfig& config, const MappingConfig& mapping, const GicpConfig& gicp,
@@ -70,6 +75,7 @@ class PoseOptimiser {
 
  private:
   struct System;
+  [[nodiscard]] Matrix6d covariance(const System& system, const Matrix6d& prior) const;
   [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
   void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
                   System& system) const;

@@ -10,55 +10,18 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "cloud/gicp_search.hpp"
+#include "cloud/pixel_depth.hpp"
 #include "map/overlap.hpp"
 #include "vision/image_pyramid.hpp"
+#include "vision/place_view.hpp"
 #include "vision/pnp.hpp"
 
 namespace geoflow::slam {
 namespace {
 
-constexpr std::size_t kRelocationKeyframes =
-    30;  ///< newest keyframes that a lost frame is compared with
-/// Two views whose depth agrees in this share of the surfels are of one place.
-constexpr double kFits = 0.7;
-/// A place found by descriptors is believed when its depth agrees in this share: a wrong one agrees
-/// in few surfels.
-constexpr double kSamePlace = 0.3;
 /// A frame is registered to keyframes that see at least this share of its depth.
 constexpr double kTargetOverlap = 0.5;
-
-/// Where nothing is known of the pose, many features make up for the few that two views have in
-/// common.
-FeatureConfig dense(FeatureConfig config) {
-  constexpr int kTimes = 4;
-  config.features_per_cell *= kTimes;
-  return config;
-}
-
-/// Registration from a guess that may be far off, as after a gap: besides the guess, no motion at
-/// all, and, unless one of these fits well, motions around that in every direction. The one that
-/// fits most of the surfels is taken.
-RegistrationResult register_from_afar(const DepthCloud& source, const DepthCloud& target,
-                                      const SE3& T_target_source_guess, const GicpConfig& config) {
-  constexpr double kStepM = 0.2;
-  constexpr double kStepRad = 0.15;
-  RegistrationResult best = register_clouds(source, target, T_target_source_guess, config);
-  const auto attempt = [&](const SE3& guess) {
-    if (best.overlap < kFits || !best.converged) {
-      const RegistrationResult result = register_clouds(source, target, guess, config);
-      if (result.converged && (!best.converged || result.overlap > best.overlap)) {
-        best = result;
-      }
-    }
-  };
-  attempt(SE3{});
-  for (int axis = 0; axis < 6; ++axis) {
-    const double step = axis < 3 ? kStepRad : kStepM;
-    attempt(SE3::exp(step * Vector6d::Unit(axis)));
-    attempt(SE3::exp(-step * Vector6d::Unit(axis)));
-  }
-  return best;
-}
 
 }  // namespace
 
@@ -71,7 +34,7 @@ Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration
       flow_{config.flow, camera_},
       optimiser_{config.pose, config.mapping, gicp, camera_},
       orb_{config.features},
-      dense_orb_{dense(config.features)},
+      relocaliser_{config, gicp, camera_},
       grid_{std::move(grid)},
       observer_{observer} {}
 
@@ -81,8 +44,8 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
   current_.t = packet.t;
   {
     const StageScope scope{observer_, Stage::kPyramid};
-    current_.pyramid =
-        ImagePyramid{gray_image(packet.color), config_.flow.window_px, config_.flow.levels};
+    current_.pyramid = std::make_shared<const ImagePyramid>(
+        gray_image(packet.color), config_.flow.window_px, config_.flow.levels);
   }
   const StageScope scope{observer_, Stage::kCloud};
   if (packet.depth) {
@@ -114,7 +77,7 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
     }
     seeds.push_back(seed);
   }
-  const auto tracks = flow_.track(previous_.pyramid, current_.pyramid, seeds);
+  const auto tracks = flow_.track(*previous_.pyramid, *current_.pyramid, seeds);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (tracks[i]) {
       Feature feature = feature_at(*tracks[i]);
@@ -139,7 +102,8 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
       expected.push_back({camera_.distort(camera_.project(p_cam)), point->descriptor});
     }
   }
-  const std::vector<OrbFeature> found = orb_.extract(current_.pyramid.image(), {});
+  describe();
+  const std::vector<OrbFeature>& found = current_.place->features;
   const std::vector<int> match = match_by_projection(expected, found, kRadiusPx);
   for (std::size_t i = 0; i < match.size(); ++i) {
     if (match[i] >= 0) {
@@ -150,60 +114,40 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
   }
 }
 
-bool Tracker::agrees_in_depth(const Map& map, KeyframeId keyframe, const SE3& T_odom_cam) const {
-  if (!current_.cloud) {
-    return true;
+void Tracker::describe() {
+  if (!current_.place) {
+    current_.place = describe_place(current_.pyramid->image(), current_.depth,
+                                    calibration_.depth_unit_m, camera_, orb_);
   }
-  const auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kSamePlace);
-  return std::any_of(overlapping.begin(), overlapping.end(),
-                     [&](const OverlappingKeyframe& k) { return k.id == keyframe; });
 }
 
-std::optional<SE3> Tracker::relocate(const Map& map) {
-  const std::vector<OrbFeature> found = dense_orb_.extract(current_.pyramid.image(), {});
-  const double anywhere = camera_.intrinsics().width + camera_.intrinsics().height;
-  const Vector2d middle{camera_.intrinsics().cx, camera_.intrinsics().cy};
-  std::optional<SE3> best;
-  std::size_t most = 0;
-  std::size_t tried = 0;
-  for (auto keyframe = map.keyframes().rbegin();
-       keyframe != map.keyframes().rend() && tried < kRelocationKeyframes; ++keyframe, ++tried) {
-    std::vector<ExpectedFeature> expected;
-    for (const PointId id : keyframe->second.points) {
-      expected.push_back({middle, map.find_point(id)->descriptor});
-    }
-    const std::vector<int> match = match_by_projection(expected, found, anywhere);
-    std::vector<Feature> features;
-    std::vector<VisualMatch> matches;
-    for (std::size_t i = 0; i < match.size(); ++i) {
-      if (match[i] >= 0) {
-        Feature feature = feature_at(found[static_cast<std::size_t>(match[i])].pixel);
-        feature.point = keyframe->second.points[i];
-        features.push_back(feature);
-        matches.push_back({map.find_point(*feature.point)->p_odom, feature.ideal, feature.depth_m});
-      }
-    }
-    const std::optional<PnpSolution> solution =
-        solve_pnp(matches, camera_, config_.pose, kPnpOnDescriptors);
-    if (solution && solution->inliers > most &&
-        agrees_in_depth(map, keyframe->first, solution->T_odom_cam)) {
-      most = solution->inliers;
-      best = solution->T_odom_cam;
-      current_.features = std::move(features);
-    }
+std::optional<SE3> Tracker::relocate(const Map& map, const SE3& T_odom_cam_predicted) {
+  describe();
+  const auto found = relocaliser_.find(map, current_, T_odom_cam_predicted);
+  if (!found) {
+    return std::nullopt;
   }
-  return best;
+  current_.features.clear();
+  for (const Relocation::Track& track : found->tracks) {
+    Feature feature = feature_at(track.raw);
+    feature.point = track.point;
+    feature.descriptor = map.find_point(track.point)->descriptor;
+    current_.features.push_back(feature);
+  }
+  return found->T_odom_cam;
 }
 
 std::vector<VisualMatch> Tracker::matches(const Map& map,
-                                          std::vector<std::size_t>& feature_of_match) const {
+                                          std::vector<std::size_t>* feature_of_match) const {
   std::vector<VisualMatch> found;
   for (std::size_t i = 0; i < current_.features.size(); ++i) {
     const Feature& feature = current_.features[i];
     const MapPoint* point = feature.point ? map.find_point(*feature.point) : nullptr;
     if (point != nullptr) {
       found.push_back({point->p_odom, feature.ideal, feature.depth_m});
-      feature_of_match.push_back(i);
+      if (feature_of_match != nullptr) {
+        feature_of_match->push_back(i);
+      }
     }
   }
   return found;
@@ -212,8 +156,12 @@ std::vector<VisualMatch> Tracker::matches(const Map& map,
 Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
                                            std::span<const VisualMatch> matches) const {
   const StageScope scope{observer_, Stage::kPoseInitialisation};
-  if (const std::optional<PnpSolution> pose =
-          solve_pnp(matches, camera_, config_.pose, kPnpOnTracks)) {
+  // Tracks have been checked forward and backward: half of them should agree.
+  const PnpEffort effort{
+      .least_inliers = static_cast<std::size_t>(config_.pose.minimum_visual_inliers),
+      .least_inlier_share = 0.5,
+      .iterations = 100};
+  if (const std::optional<PnpSolution> pose = solve_pnp(matches, camera_, config_.pose, effort)) {
     return {pose->T_odom_cam, PoseSource::kPnp, true};
   }
   if (config_.switches.gicp && current_.cloud && previous_.cloud) {
@@ -221,7 +169,8 @@ Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
     const RegistrationResult found = register_from_afar(*current_.cloud, *previous_.cloud,
                                                         T_odom_target.inverse() * predicted, gicp_);
     if (found.converged) {
-      return {T_odom_target * found.T_target_source, PoseSource::kGicp, found.overlap > kFits};
+      return {T_odom_target * found.T_target_source, PoseSource::kGicp,
+              found.overlap > kGoodOverlap};
     }
   }
   return {predicted, PoseSource::kConstantVelocity, false};
@@ -246,49 +195,81 @@ void Tracker::keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_
   current_.features = std::move(kept);
 }
 
+void Tracker::follow(const Map& map, const SE3& T_odom_cam_predicted) {
+  const StageScope scope{observer_, Stage::kFlow};
+  if (config_.switches.optical_flow) {
+    follow_by_flow(map, T_odom_cam_predicted);
+  } else {
+    follow_by_descriptors(map, T_odom_cam_predicted);
+  }
+}
+
+Tracker::InitialPose Tracker::first_guess(const Map& map, const PosePrior& prior, bool blind) {
+  follow(map, prior.T_odom_cam);
+  InitialPose initial = initial_pose(prior.T_odom_cam, matches(map));
+  const bool held = previous_.anchored && !blind;
+  current_.anchored = held;
+  if (!held || !initial.sure) {
+    if (const std::optional<SE3> pose = relocate(map, prior.T_odom_cam)) {
+      current_.anchored = true;
+      return {*pose, PoseSource::kPnp, true};
+    }
+  }
+  if (!current_.anchored) {
+    // What flow says of map points after the thread was lost may be anything.
+    for (Feature& feature : current_.features) {
+      feature.point.reset();
+      feature.anchor.reset();
+    }
+    if (initial.source == PoseSource::kPnp) {
+      initial = initial_pose(prior.T_odom_cam, {});
+    }
+  }
+  return initial;
+}
+
+std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odom_cam,
+                                                double& overlap) const {
+  std::vector<DepthTarget> targets;
+  if (!current_.cloud) {
+    return targets;
+  }
+  if (!current_.anchored) {
+    if (config_.switches.gicp && previous_.cloud) {
+      targets.push_back({previous_.cloud.get(), previous_.T_odom_cam});
+    }
+    return targets;
+  }
+  const auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kTargetOverlap);
+  overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
+  if (config_.switches.gicp) {
+    for (const KeyframeId id :
+         registration_targets(overlapping, static_cast<std::size_t>(config_.pose.gicp_targets))) {
+      targets.push_back({map.keyframe(id).cloud.get(), map.keyframe(id).T_odom_cam});
+    }
+  }
+  return targets;
+}
+
 TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   TrackingResult result;
   const PosePrior prior = motion.predict(current_.t);
-  {
-    const StageScope scope{observer_, Stage::kFlow};
-    if (config_.switches.optical_flow) {
-      follow_by_flow(map, prior.T_odom_cam);
-    } else {
-      follow_by_descriptors(map, prior.T_odom_cam);
-    }
-  }
-  std::vector<std::size_t> feature_of_match;
-  std::vector<VisualMatch> visual = matches(map, feature_of_match);
-  InitialPose initial = initial_pose(prior.T_odom_cam, visual);
-  if (!initial.sure) {
-    if (const std::optional<SE3> pose = relocate(map)) {
-      initial = {*pose, PoseSource::kPnp, true};
-      feature_of_match.clear();
-      visual = matches(map, feature_of_match);
-    }
-  }
+  const InitialPose initial = first_guess(map, prior, motion.blind(current_.t));
   result.source = initial.source;
   result.sure = initial.sure;
+  result.anchored = current_.anchored;
 
   const StageScope scope{observer_, Stage::kPoseOptimisation};
-  std::vector<KeyframeId> targets;
-  if (current_.cloud) {
-    const auto overlapping =
-        overlapping_keyframes(map, *current_.cloud, initial.T_odom_cam, kTargetOverlap);
-    result.overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
-    targets =
-        registration_targets(overlapping, static_cast<std::size_t>(config_.pose.gicp_targets));
-  }
-  std::vector<DepthTarget> depth_targets;
-  if (config_.switches.gicp) {
-    for (const KeyframeId id : targets) {
-      depth_targets.push_back({map.keyframe(id).cloud.get(), map.keyframe(id).T_odom_cam});
-    }
-  }
+  std::vector<std::size_t> feature_of_match;
+  const std::vector<VisualMatch> visual = matches(map, &feature_of_match);
+  const std::vector<DepthTarget> targets = depth_targets(map, initial.T_odom_cam, result.overlap);
   result.solution = optimiser_.solve(
-      {.matches = visual, .cloud = current_.cloud.get(), .targets = depth_targets, .prior = prior},
+      {.matches = visual, .cloud = current_.cloud.get(), .targets = targets, .prior = prior},
       initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
+  result.covariance = initial.sure
+                          ? result.solution.covariance
+                          : Matrix6d{prior.information.diagonal().cwiseInverse().asDiagonal()};
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);
   result.visual_fix = result.solution.visual_inliers >= enough;

@@ -15,6 +15,7 @@
 #include "odometry/frame.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "place/relocaliser.hpp"
 #include "vision/dual_stream_flow.hpp"
 #include "vision/orb_features.hpp"
 
@@ -26,7 +27,10 @@ struct TrackingResult {
   PoseSource source = PoseSource::kNone;
   bool visual_fix = false;  ///< enough map points agree with the pose
   bool sure = false;        ///< the first guess was checked by enough of what it was made from
-  double depth_share = 0;   ///< share of the frame's depth that agrees with the map, 0 to 1
+  bool anchored = false;    ///< the pose hangs together with the map (Frame::anchored)
+  /// Of the pose in respect of the map, or, where it is not anchored, of the frame before.
+  Matrix6d covariance = Matrix6d::Zero();
+  double depth_share = 0;  ///< share of the frame's depth that agrees with the map, 0 to 1
   double overlap = 0;  ///< largest share of the frame's depth that one keyframe sees too, 0 to 1
 };
 
@@ -52,17 +56,22 @@ class Tracker {
     PoseSource source;
     bool sure;  ///< checked by enough of what it was made from
   };
+  void follow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
-  /// Looks for the current frame in the newest keyframes by descriptors alone: needs no prediction.
-  /// On success the frame's features are the matches.
-  [[nodiscard]] std::optional<SE3> relocate(const Map& map);
-  [[nodiscard]] bool agrees_in_depth(const Map& map, KeyframeId keyframe,
-                                     const SE3& T_odom_cam) const;
-  [[nodiscard]] std::vector<VisualMatch> matches(const Map& map,
-                                                 std::vector<std::size_t>& feature_of_match) const;
+  void describe();
+  /// Looks for the current frame in the map without a prediction. On success its features are those
+  /// of the map points in view.
+  [[nodiscard]] std::optional<SE3> relocate(const Map& map, const SE3& T_odom_cam_predicted);
+  /// What the frame's depth is registered to at a pose; `overlap` as in TrackingResult.
+  [[nodiscard]] std::vector<DepthTarget> depth_targets(const Map& map, const SE3& T_odom_cam,
+                                                       double& overlap) const;
+  /// The frame's features that show map points, and, where asked for, which features they are.
+  [[nodiscard]] std::vector<VisualMatch> matches(
+      const Map& map, std::vector<std::size_t>* feature_of_match = nullptr) const;
   [[nodiscard]] InitialPose initial_pose(const SE3& predicted,
                                          std::span<const VisualMatch> matches) const;
+  [[nodiscard]] InitialPose first_guess(const Map& map, const PosePrior& prior, bool blind);
   void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
                     const PoseSolution& solution);
   [[nodiscard]] Feature feature_at(const Vector2d& raw) const;
@@ -74,7 +83,7 @@ class Tracker {
   DualStreamFlow flow_;
   PoseOptimiser optimiser_;
   OrbExtractor orb_;
-  OrbExtractor dense_orb_;
+  Relocaliser relocaliser_;
   std::shared_ptr<const CellGrid> grid_;
   StageObserver* observer_;
   Frame previous_;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstring>
 #include <span>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -26,25 +28,39 @@ constexpr int kPatchPx = 31;  ///< side of the patch that a descriptor compares 
 constexpr int kMaximumHamming = 64;
 constexpr double kSecondBestRatio = 0.85;
 
-/// Keeps the strongest few of each grid cell.
-std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> candidates, const cv::Size& size,
-                                 const FeatureConfig& config) {
-  std::stable_sort(
-      candidates.begin(), candidates.end(),
-      [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; });
-  const int columns = size.width / config.cell_px + 1;
-  const int rows = size.height / config.cell_px + 1;
-  cv::Mat1i count(rows, columns, 0);
-  std::vector<cv::KeyPoint> kept;
-  for (const cv::KeyPoint& key_point : candidates) {
-    int& in_cell = count(static_cast<int>(key_point.pt.y) / config.cell_px,
-                         static_cast<int>(key_point.pt.x) / config.cell_px);
-    if (in_cell < config.features_per_cell) {
-      ++in_cell;
-      kept.push_back(key_point);
-    }
+/// Counts what has been taken of each grid cell.
+class CellCount {
+ public:
+  CellCount(const cv::Size& image, int cell_px, int most)
+      : cell_px_{cell_px},
+        most_{most},
+        count_(image.height / cell_px + 1, image.width / cell_px + 1, 0) {}
+
+  /// Whether there is room in the cell of a pixel; takes it.
+  bool take(double x, double y) {
+    int& in_cell = count_(static_cast<int>(y) / cell_px_, static_cast<int>(x) / cell_px_);
+    return in_cell < most_ && ++in_cell > 0;
   }
-  return kept;
+
+ private:
+  int cell_px_;
+  int most_;
+  cv::Mat1i count_;
+};
+
+/// Keeps the strongest few of each grid cell, strongest first.
+std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> candidates, const cv::Size& image,
+                                 const FeatureConfig& config) {
+  // By place where equally strong, so that the order is one whatever the detector's is.
+  std::sort(candidates.begin(), candidates.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    return std::tuple{-a.response, a.octave, a.pt.y, a.pt.x} <
+           std::tuple{-b.response, b.octave, b.pt.y, b.pt.x};
+  });
+  CellCount cells{image, config.cell_px, config.described_per_cell};
+  std::erase_if(candidates, [&](const cv::KeyPoint& key_point) {
+    return !cells.take(static_cast<double>(key_point.pt.x), static_cast<double>(key_point.pt.y));
+  });
+  return candidates;
 }
 
 /// Marks the surroundings of taken pixels as not to be used (0); the rest is 255.
@@ -69,21 +85,10 @@ OrbExtractor::OrbExtractor(const FeatureConfig& config)
       orb_{cv::ORB::create(kCandidates, kScaleFactor, kOctaves, kPatchPx, 0, 2, cv::ORB::FAST_SCORE,
                            kPatchPx, config.fast_threshold)} {}
 
-std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& gray,
-                                              std::span<const Vector2d> taken) {
-  const cv::Mat1b mask = free_mask(gray.size(), taken, config_.mask_radius_px);
+std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& gray) {
   std::vector<cv::KeyPoint> key_points;
-  orb_->setFastThreshold(config_.fast_threshold);
-  orb_->detect(gray, key_points, mask);
+  orb_->detect(gray, key_points);
   key_points = spread(std::move(key_points), gray.size(), config_);
-  const std::size_t cells =
-      static_cast<std::size_t>((gray.cols / config_.cell_px) * (gray.rows / config_.cell_px));
-  if (key_points.size() + taken.size() < cells) {
-    orb_->setFastThreshold(config_.fast_threshold_minimum);
-    std::vector<cv::KeyPoint> faint;
-    orb_->detect(gray, faint, mask);
-    key_points = spread(std::move(faint), gray.size(), config_);
-  }
   cv::Mat descriptors;
   orb_->compute(gray, key_points, descriptors);
 
@@ -95,6 +100,26 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& gray,
                 sizeof(Descriptor));
   }
   return features;
+}
+
+std::vector<OrbFeature> choose_new(std::span<const OrbFeature> features,
+                                   std::span<const Vector2d> taken, const cv::Size& image,
+                                   const FeatureConfig& config) {
+  const cv::Mat1b mask = free_mask(image, taken, config.mask_radius_px);
+  CellCount cells{image, config.cell_px, config.features_per_cell};
+  std::vector<OrbFeature> chosen;
+  for (const OrbFeature& feature : features) {
+    const int x = static_cast<int>(std::lround(feature.pixel.x()));
+    const int y = static_cast<int>(std::lround(feature.pixel.y()));
+    if (mask(y, x) != 0 && cells.take(feature.pixel.x(), feature.pixel.y())) {
+      chosen.push_back(feature);
+    }
+  }
+  return chosen;
+}
+
+bool looks_alike(double distance, double second_distance) noexcept {
+  return distance <= kMaximumHamming && distance <= kSecondBestRatio * second_distance;
 }
 
 std::vector<int> match_by_projection(std::span<const ExpectedFeature> expected,
@@ -120,8 +145,7 @@ std::vector<int> match_by_projection(std::span<const ExpectedFeature> expected,
         second_distance = std::min(second_distance, distance);
       }
     }
-    if (best < 0 || best_distance > kMaximumHamming ||
-        best_distance > kSecondBestRatio * second_distance) {
+    if (best < 0 || !looks_alike(best_distance, second_distance)) {
       continue;
     }
     const auto j = static_cast<std::size_t>(best);

@@ -39,14 +39,25 @@ class OrbExtractor {
  public:
   explicit OrbExtractor(const FeatureConfig& config);
 
-  /// Features of a gray image (CV_8UC1), none within mask_radius_px of the raw pixels in `taken`.
-  [[nodiscard]] std::vector<OrbFeature> extract(const cv::Mat& gray,
-                                                std::span<const Vector2d> taken);
+  /// Features of a gray image (CV_8UC1), at most FeatureConfig::described_per_cell in a cell,
+  /// strongest first.
+  [[nodiscard]] std::vector<OrbFeature> extract(const cv::Mat& gray);
 
  private:
   FeatureConfig config_;
   cv::Ptr<cv::ORB> orb_;
 };
+
+/// Those of `features` that are worth tracking beside what is tracked already: at most
+/// features_per_cell in a cell, none within mask_radius_px of the raw pixels in `taken`.
+[[nodiscard]] std::vector<OrbFeature> choose_new(std::span<const OrbFeature> features,
+                                                 std::span<const Vector2d> taken,
+                                                 const cv::Size& image,
+                                                 const FeatureConfig& config);
+
+/// Whether a descriptor at this Hamming distance is the same place's, given that of the second
+/// nearest one.
+[[nodiscard]] bool looks_alike(double distance, double second_distance) noexcept;
 
 /// A place where a described feature is expected.
 struct ExpectedFeature {

@@ -18,7 +18,7 @@ std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
                                      const CameraModel& camera, const PoseConfig& config,
                                      const PnpEffort& effort) {
   constexpr double kConfidence = 0.99;
-  if (matches.size() < static_cast<std::size_t>(config.minimum_visual_inliers)) {
+  if (matches.size() < effort.least_inliers) {
     return std::nullopt;
   }
   std::vector<cv::Point3d> points;
@@ -35,9 +35,8 @@ std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
   const bool found = cv::solvePnPRansac(
       points, pixels, K, cv::noArray(), rotation, translation, false, effort.iterations,
       static_cast<float>(config.pnp_threshold_px), kConfidence, inliers, cv::SOLVEPNP_P3P);
-  const auto enough = static_cast<double>(config.minimum_visual_inliers);
   const auto count = static_cast<double>(inliers.size());
-  if (!found || count < enough ||
+  if (!found || inliers.size() < effort.least_inliers ||
       count < effort.least_inlier_share * static_cast<double>(matches.size())) {
     return std::nullopt;
   }

@@ -192,6 +192,20 @@ TEST(Synchroniser, AStreamThatNeverCameIsWaitedForOnlyAtTheBeginning) {
   EXPECT_EQ(sync.counters().imu.silences, 1U);
 }
 
+TEST(Synchroniser, WaitsForDepthAgainWhenTheWholeCameraWasAway) {
+  Synchroniser sync{{}, kCameraOnly};
+  sync.push_color(color(100));
+  sync.push_depth(depth(100));
+  ASSERT_EQ(pop_all(sync, 100).size(), 1U);
+  sync.push_color(color(1100));
+  EXPECT_TRUE(pop_all(sync, 1101).empty()) << "depth of the same instant is about to come";
+  sync.push_depth(depth(1100));
+  const auto packets = pop_all(sync, 1101);
+  ASSERT_EQ(packets.size(), 1U);
+  EXPECT_TRUE(packets[0].depth);
+  EXPECT_EQ(sync.counters().depth.silences, 0U);
+}
+
 TEST(Synchroniser, DepthThatFellSilentIsCountedAndNotWaitedFor) {
   Synchroniser sync{{}, kCameraOnly};
   sync.push_depth(depth(0));

@@ -12,8 +12,9 @@ void Liveness::heard(HostTime t_arrival) noexcept {
   waiting_ = true;
 }
 
-bool Liveness::is_alive(HostTime now, HostTime began, std::uint64_t& silences) noexcept {
-  if (waiting_ && now - last_.value_or(began) > silent_after_) {
+bool Liveness::is_alive(HostTime now, HostTime listening_since, std::uint64_t& silences) noexcept {
+  const HostTime silent_since = std::max(last_.value_or(listening_since), listening_since);
+  if (waiting_ && now - silent_since > silent_after_) {
     waiting_ = false;
     ++silences;
   }

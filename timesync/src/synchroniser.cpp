@@ -38,6 +38,7 @@ Synchroniser::Synchroniser(const SynchroniserConfig& config, const SynchroniserS
 
 void Synchroniser::push_color(const Arrival<CameraClock, ColorFrame>& frame) {
   note_arrival(frame.t_arrival);
+  note_color(frame.t_arrival);
   color_.push(frame, camera_clock_, Duration::zero(), counters_.color);
   counters_.camera_clock = camera_clock_.counters();
 }
@@ -98,9 +99,18 @@ std::optional<SyncedPacket> Synchroniser::flush() {
 }
 
 void Synchroniser::note_arrival(HostTime t_arrival) noexcept {
-  if (!began_ && is_plausible_stamp_ns(t_arrival.time_since_epoch().count())) {
-    began_ = t_arrival;
+  if (!listening_since_ && is_plausible_stamp_ns(t_arrival.time_since_epoch().count())) {
+    listening_since_ = t_arrival;
   }
+}
+
+/// Where colour itself was silent, the others' silence of that time says nothing: the whole camera
+/// was away.
+void Synchroniser::note_color(HostTime t_arrival) noexcept {
+  if (last_color_ && t_arrival - *last_color_ > config_.silent_after) {
+    listening_since_ = t_arrival;
+  }
+  last_color_ = t_arrival;
 }
 
 std::optional<HostTime> Synchroniser::next_color() const {
@@ -112,12 +122,12 @@ DepthChoice Synchroniser::depth_for(HostTime t) const {
 }
 
 bool Synchroniser::is_complete(HostTime t, HostTime now) {
-  const HostTime began = began_.value_or(now);
+  const HostTime since = listening_since_.value_or(now);
   // Not short-circuited: each asks whether its stream fell silent, and counts that.
-  const bool depth = depth_.is_ready(t, now, began, counters_.depth);
-  const bool imu = imu_.is_ready(t, now, began, counters_.imu);
-  const bool legs = legs_.is_ready(t, now, began, counters_.legs);
-  const bool body_velocity = body_velocity_.is_ready(t, now, began, counters_.body_velocity);
+  const bool depth = depth_.is_ready(t, now, since, counters_.depth);
+  const bool imu = imu_.is_ready(t, now, since, counters_.imu);
+  const bool legs = legs_.is_ready(t, now, since, counters_.legs);
+  const bool body_velocity = body_velocity_.is_ready(t, now, since, counters_.body_velocity);
   return depth && imu && legs && body_velocity && !must_see_next_color(t);
 }
 

@@ -17,9 +17,11 @@ class Liveness {
   /// A sample arrived, usable or not.
   void heard(HostTime t_arrival) noexcept;
 
-  /// Whether to wait for the stream at `now`; `began` is when the first sample of any stream
-  /// arrived. Counts one silence when it stops being so.
-  [[nodiscard]] bool is_alive(HostTime now, HostTime began, std::uint64_t& silences) noexcept;
+  /// Whether to wait for the stream at `now`. `listening_since`: since when it is expected to be
+  /// heard, if it is at all; silence does not begin before that. Counts one silence when it stops
+  /// being so.
+  [[nodiscard]] bool is_alive(HostTime now, HostTime listening_since,
+                              std::uint64_t& silences) noexcept;
 
  private:
   bool waiting_;

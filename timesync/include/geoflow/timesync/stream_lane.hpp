@@ -44,8 +44,9 @@ class StreamLane {
 
   /// Whether nothing at or before `t` need be waited for: a sample at or after it came, or the
   /// stream is silent.
-  [[nodiscard]] bool is_ready(HostTime t, HostTime now, HostTime began, StreamCounters& counters) {
-    const bool alive = liveness_.is_alive(now, began, counters.silences);
+  [[nodiscard]] bool is_ready(HostTime t, HostTime now, HostTime listening_since,
+                              StreamCounters& counters) {
+    const bool alive = liveness_.is_alive(now, listening_since, counters.silences);
     return !alive || (buffer.newest() && *buffer.newest() >= t);
   }
 

@@ -51,6 +51,7 @@ class Synchroniser {
 
  private:
   void note_arrival(HostTime t_arrival) noexcept;
+  void note_color(HostTime t_arrival) noexcept;
   [[nodiscard]] std::optional<HostTime> next_color() const;
   [[nodiscard]] DepthChoice depth_for(HostTime t) const;
   [[nodiscard]] bool is_complete(HostTime t, HostTime now);
@@ -69,8 +70,9 @@ class Synchroniser {
   StreamLane<LegSample> legs_;
   StreamLane<BodyVelocitySample> body_velocity_;
   SynchroniserCounters counters_;
-  std::optional<HostTime> last_t_;  // of the last packet
-  std::optional<HostTime> began_;   // arrival of the first sample
+  std::optional<HostTime> last_t_;           // of the last packet
+  std::optional<HostTime> last_color_;       // arrival of the last colour frame
+  std::optional<HostTime> listening_since_;  // first arrival, at all or after colour was silent
 };
 
 }  // namespace geoflow::timesync

@@ -1,4 +1,4 @@
-#include "odometry/frame.hpp"
+#include "cloud/pixel_depth.hpp"
 
 #include <algorithm>
 #include <array>

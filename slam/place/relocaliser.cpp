@@ -1,0 +1,211 @@
+#include "place/relocaliser.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/gicp.hpp"
+#include "cloud/gicp_search.hpp"
+#include "map/map.hpp"
+#include "map/overlap.hpp"
+#include "odometry/frame.hpp"
+#include "odometry/pose_optimiser.hpp"
+#include "vision/dual_stream_flow.hpp"
+#include "vision/place_view.hpp"
+#include "vision/pnp.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+/// Newest keyframes whose features are compared; and those whose depth is searched, which takes
+/// longer.
+constexpr std::size_t kNewestByFeatures = 30;
+constexpr std::size_t kNewestByDepth = 3;
+/// A pose found from pairs of descriptors is a hypothesis when so many of them agree with it.
+constexpr PnpEffort kHypothesis{.least_inliers = 8, .least_inlier_share = 0.2, .iterations = 1000};
+/// With so many it is certain.
+constexpr std::size_t kCertainInliers = 20;
+constexpr double kCertainShare = 0.4;
+/// Otherwise it is confirmed by what the descriptors know nothing of. Either so many map points can
+/// be followed from the keyframe's image into the frame's and agree on one pose: where there is
+/// nothing to follow, a patch rarely returns to where it came from, and never in agreement with
+/// others.
+constexpr PnpEffort kConfirmation{
+    .least_inliers = 20, .least_inlier_share = 0.5, .iterations = 100};
+/// Or, where blur or another point of view leave little to follow, the depth seen in both views, if
+/// it is so much, lies on one surface in this share, and leaves no direction open.
+constexpr double kDepthConfirmsSeen = 0.3;
+constexpr double kDepthConfirms = 0.9;
+/// Followed points further from where the confirmed pose puts them are wrong [px].
+constexpr double kFollowedPx = 5;
+/// With so many followed the search ends.
+constexpr std::size_t kPlenty = 60;
+/// Keyframes with fewer points cannot confirm anything.
+constexpr std::size_t kTextured = 40;
+/// With a smaller share on one surface the views contradict each other.
+constexpr double kDepthAgrees = 0.6;
+/// The same where depth is all there is.
+constexpr double kDepthDecides = 0.85;
+/// With less of the depth seen in both views it says nothing.
+constexpr double kDepthSeen = 0.15;
+
+}  // namespace
+
+std::optional<Relocaliser::Hypothesis> Relocaliser::by_features(const Frame& frame,
+                                                                const Keyframe& keyframe) const {
+  std::vector<VisualMatch> matches;
+  for (const PlaceMatch& match : match_places(*frame.place, *keyframe.place)) {
+    const Vector3d& p_cam = keyframe.place->p_cam[match.b];
+    if (p_cam.z() > 0) {
+      matches.push_back({keyframe.T_odom_cam * p_cam,
+                         camera_.undistort(frame.place->features[match.a].pixel),
+                         frame.place->p_cam[match.a].z()});
+    }
+  }
+  const auto solution = solve_pnp(matches, camera_, config_.pose, kHypothesis);
+  if (!solution) {
+    return std::nullopt;
+  }
+  Hypothesis hypothesis = refined(frame, keyframe, solution->T_odom_cam);
+  const double share = static_cast<double>(solution->inliers) / static_cast<double>(matches.size());
+  hypothesis.certain =
+      hypothesis.certain || (solution->inliers >= kCertainInliers && share >= kCertainShare);
+  return hypothesis;
+}
+
+Relocaliser::Hypothesis Relocaliser::refined(const Frame& frame, const Keyframe& keyframe,
+                                             const SE3& T_odom_cam) const {
+  // What few features leave uncertain; a registration that goes further has found something else.
+  constexpr double kFarM = 0.2;
+  constexpr double kFarRad = 0.15;
+  if (!frame.cloud || !keyframe.cloud) {
+    return {T_odom_cam, false};
+  }
+  const SE3 T_keyframe_cam = keyframe.T_odom_cam.inverse() * T_odom_cam;
+  const RegistrationResult found =
+      register_clouds(*frame.cloud, *keyframe.cloud, T_keyframe_cam, gicp_);
+  const Vector6d moved = (T_keyframe_cam.inverse() * found.T_target_source).log();
+  if (!found.converged || moved.head<3>().norm() > kFarRad || moved.tail<3>().norm() > kFarM) {
+    return {T_odom_cam, false};
+  }
+  const DepthAgreement depth =
+      depth_agreement(*frame.cloud, *keyframe.cloud, found.T_target_source);
+  const bool confirms = found.degenerate_directions == 0 && depth.seen > kDepthConfirmsSeen &&
+                        depth.agreeing > kDepthConfirms * depth.seen;
+  return {T_odom_cam * SE3::exp(moved), confirms};
+}
+
+std::vector<FlowSeed> Relocaliser::seeds(const Map& map, KeyframeId id,
+                                         const SE3& T_odom_cam) const {
+  const SE3 T_cam_odom = T_odom_cam.inverse();
+  std::vector<FlowSeed> seeds;
+  for (const PointId point_id : map.keyframe(id).points) {
+    const MapPoint& point = *map.find_point(point_id);
+    const auto observation = std::find_if(point.observations.begin(), point.observations.end(),
+                                          [&](const Observation& o) { return o.keyframe == id; });
+    FlowSeed seed{.previous = camera_.distort(observation->pixel), .predicted = std::nullopt};
+    const Vector3d p_cam = T_cam_odom * point.p_odom;
+    if (p_cam.z() > 0) {
+      seed.predicted = camera_.distort(camera_.project(p_cam));
+    }
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+std::optional<Relocation> Relocaliser::confirmed(const Map& map, const Frame& frame, KeyframeId id,
+                                                 const Hypothesis& hypothesis) const {
+  const Keyframe& keyframe = map.keyframe(id);
+  const auto tracks =
+      flow_.track(*keyframe.pyramid, *frame.pyramid, seeds(map, id, hypothesis.T_odom_cam));
+  std::vector<VisualMatch> matches;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i]) {
+      matches.push_back(
+          {map.find_point(keyframe.points[i])->p_odom, camera_.undistort(*tracks[i]), 0});
+    }
+  }
+  Relocation found{id, hypothesis.T_odom_cam, {}};
+  if (const auto solution = solve_pnp(matches, camera_, config_.pose, kConfirmation)) {
+    found.T_odom_cam = solution->T_odom_cam;
+  } else if (!hypothesis.certain) {
+    return std::nullopt;
+  }
+  if (!depth_agrees(frame, keyframe, found.T_odom_cam)) {
+    return std::nullopt;
+  }
+  const SE3 T_cam_odom = found.T_odom_cam.inverse();
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i]) {
+      const Vector3d p_cam = T_cam_odom * map.find_point(keyframe.points[i])->p_odom;
+      const Vector2d off = camera_.project(p_cam) - camera_.undistort(*tracks[i]);
+      if (p_cam.z() > 0 && off.norm() < kFollowedPx) {
+        found.tracks.push_back({keyframe.points[i], *tracks[i]});
+      }
+    }
+  }
+  return found;
+}
+
+bool Relocaliser::depth_agrees(const Frame& frame, const Keyframe& keyframe,
+                               const SE3& T_odom_cam) {
+  if (!frame.cloud || !keyframe.cloud) {
+    return true;
+  }
+  const DepthAgreement depth =
+      depth_agreement(*frame.cloud, *keyframe.cloud, keyframe.T_odom_cam.inverse() * T_odom_cam);
+  return depth.seen < kDepthSeen || depth.agreeing > kDepthAgrees * depth.seen;
+}
+
+std::optional<Relocation> Relocaliser::by_depth(const Map& map, const Frame& frame, KeyframeId id,
+                                                const SE3& T_odom_cam_guess) const {
+  const Keyframe& keyframe = map.keyframe(id);
+  if (!frame.cloud || !keyframe.cloud) {
+    return std::nullopt;
+  }
+  const SE3& T_odom_keyframe = keyframe.T_odom_cam;
+  const RegistrationResult found = register_from_afar(
+      *frame.cloud, *keyframe.cloud, T_odom_keyframe.inverse() * T_odom_cam_guess, gicp_);
+  if (!found.converged) {
+    return std::nullopt;
+  }
+  const SE3 T_odom_cam = T_odom_keyframe * found.T_target_source;
+  if (keyframe.points.size() >= kTextured) {
+    return confirmed(map, frame, id, {T_odom_cam, false});
+  }
+  if (found.overlap < kDepthDecides || found.degenerate_directions > 0) {
+    return std::nullopt;
+  }
+  return Relocation{id, T_odom_cam, {}};
+}
+
+std::optional<Relocation> Relocaliser::find(const Map& map, const Frame& frame,
+                                            const SE3& T_odom_cam_guess) const {
+  std::optional<Relocation> best;
+  std::size_t tried = 0;
+  const auto better = [&](const std::optional<Relocation>& found) {
+    if (found && (!best || found->tracks.size() > best->tracks.size())) {
+      best = found;
+    }
+  };
+  for (auto it = map.keyframes().rbegin();
+       it != map.keyframes().rend() && it->second.pyramid && tried < kNewestByFeatures &&
+       (!best || best->tracks.size() < kPlenty);
+       ++it, ++tried) {
+    if (const auto hypothesis = by_features(frame, it->second)) {
+      better(confirmed(map, frame, it->first, *hypothesis));
+    }
+  }
+  tried = 0;
+  for (auto it = map.keyframes().rbegin();
+       !best && it != map.keyframes().rend() && it->second.pyramid && tried < kNewestByDepth;
+       ++it, ++tried) {
+    better(by_depth(map, frame, it->first, T_odom_cam_guess));
+  }
+  return best;
+}
+
+}  // namespace geoflow::slam
