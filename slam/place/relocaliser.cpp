@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t kNewestByFeatures = 30;
 constexpr std::size_t kNewestByDepth = 3;
 /// A pose found from pairs of descriptors is a hypothesis when so many of them agree with it.
-constexpr PnpEffort kHypothesis{.least_inliers = 8, .least_inlier_share = 0.2, .iterations = 1000};
+constexpr PnpEffort kHypothesis{.least_inliers = 8, .least_inlier_share = 0.2, .iterations = 400};
 /// With so many it is certain.
 constexpr std::size_t kCertainInliers = 20;
 constexpr double kCertainShare = 0.4;
@@ -84,10 +84,12 @@ Relocaliser::Hypothesis Relocaliser::refined(const Frame& frame, const Keyframe&
   if (!frame.cloud || !keyframe.cloud) {
     return {T_odom_cam, false};
   }
-  const SE3 T_keyframe_cam = keyframe.T_odom_cam.inverse() * T_odom_cam;
+  const SE3& T_odom_keyframe = keyframe.T_odom_cam;
+  const SE3 T_keyframe_cam = T_odom_keyframe.inverse() * T_odom_cam;
   const RegistrationResult found =
       register_clouds(*frame.cloud, *keyframe.cloud, T_keyframe_cam, gicp_);
-  const Vector6d moved = (T_keyframe_cam.inverse() * found.T_target_source).log();
+  const SE3& T_keyframe_cam1 = found.T_target_source;
+  const Vector6d moved = (T_keyframe_cam.inverse() * T_keyframe_cam1).log();
   if (!found.converged || moved.head<3>().norm() > kFarRad || moved.tail<3>().norm() > kFarM) {
     return {T_odom_cam, false};
   }
@@ -172,7 +174,8 @@ std::optional<Relocation> Relocaliser::by_depth(const Map& map, const Frame& fra
   if (!found.converged) {
     return std::nullopt;
   }
-  const SE3 T_odom_cam = T_odom_keyframe * found.T_target_source;
+  const SE3& T_keyframe_cam = found.T_target_source;
+  const SE3 T_odom_cam = T_odom_keyframe * T_keyframe_cam;
   if (keyframe.points.size() >= kTextured) {
     return confirmed(map, frame, id, {T_odom_cam, false});
   }

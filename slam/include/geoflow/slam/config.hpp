@@ -16,11 +16,11 @@ struct Switches {
 
 /// Grid-spread ORB features (III-1).
 struct FeatureConfig {
-  int cell_px = 40;                ///< side of a grid cell [px]
-  int features_per_cell = 2;       ///< strongest corners of a cell that are tracked
-  int described_per_cell = 4;      ///< strongest corners of a cell by which the place is known again
-  int fast_threshold = 7;          ///< FAST-9 contrast [gray levels]
-  double mask_radius_px = 10;      ///< no new feature nearer than this to a tracked one [px]
+  int cell_px = 40;            ///< side of a grid cell [px]
+  int features_per_cell = 2;   ///< strongest corners of a cell that are tracked
+  int described_per_cell = 4;  ///< strongest corners of a cell by which the place is known again
+  int fast_threshold = 7;      ///< FAST-9 contrast [gray levels]
+  double mask_radius_px = 10;  ///< no new feature nearer than this to a tracked one [px]
 };
 
 /// Pyramidal Lucas-Kanade (IV-A).
