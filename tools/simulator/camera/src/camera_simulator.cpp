@@ -1,0 +1,239 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/random.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+
+#include "src/color_view.hpp"
+#include "src/infrared_view.hpp"
+#include "src/lighting.hpp"
+#include "src/ray_scene.hpp"
+#include "src/registration.hpp"
+#include "src/sensor.hpp"
+#include "src/shader.hpp"
+#include "src/stereo.hpp"
+
+namespace geoflow::simulator {
+namespace {
+
+// Automatic exposure follows the scene with a lag: it has seen it this long before, newer views
+// counting more.
+struct Metering {
+  double before_s;
+  double weight;
+};
+constexpr std::array<Metering, 3> kMeterings{{{0.1, 0.5}, {0.25, 0.3}, {0.45, 0.2}}};
+
+// NOLINTBEGIN(readability-magic-numbers): the last two of each row are its range
+constexpr std::array<Knob<CameraOptions>, 16> kKnobs{{
+    {"camera.width", "px", "width of all images", &CameraOptions::width, 32, 1920},
+    {"camera.height", "px", "height of all images", &CameraOptions::height, 32, 1080},
+    {"camera.exposure_min_s", "s", "shortest exposure", &CameraOptions::exposure_min_s, 1e-6,
+     0.033},
+    {"camera.exposure_max_s", "s", "longest exposure; then gain rises",
+     &CameraOptions::exposure_max_s, 1e-6, 0.2},
+    {"camera.gain_max", "1", "largest gain", &CameraOptions::gain_max, 1, 256},
+    {"camera.exposure_compensation", "1", "times the brightness that exposure aims at",
+     &CameraOptions::exposure_compensation, 0.1, 10},
+    {"camera.noise_scale", "1", "times the colour sensor's noise", &CameraOptions::noise_scale, 0,
+     20},
+    {"camera.subexposures", "", "rays a pixel, spread over its exposure",
+     &CameraOptions::subexposures, 1, 64},
+    {"camera.readout_s", "s", "rolling shutter: from the first row to the last",
+     &CameraOptions::readout_s, 0, 0.033},
+    {"camera.depth_offset_s", "s", "depth is this much later than colour",
+     &CameraOptions::depth_offset_s, -0.05, 0.05},
+    {"camera.depth_noise_scale", "1", "times the deviation of disparity",
+     &CameraOptions::depth_noise_scale, 0, 20},
+    {"camera.depth_errors", "", "holes, ragged edges, flying pixels", &CameraOptions::depth_errors,
+     0, 1},
+    {"camera.depth_subpixel_px", "px", "deviation of disparity where the pattern is well seen",
+     &CameraOptions::depth_subpixel_px, 0, 2},
+    {"camera.depth_min_m", "m", "nearest depth", &CameraOptions::depth_min_m, 0, 5},
+    {"camera.depth_max_m", "m", "farthest depth", &CameraOptions::depth_max_m, 0.5, 65},
+    {"camera.projector_power", "1", "times the infrared pattern's brightness",
+     &CameraOptions::projector_power, 0, 20},
+}};
+// NOLINTEND(readability-magic-numbers)
+
+Result<void> check(const CameraOptions& options) {
+  for (const Knob<CameraOptions>& knob : kKnobs) {
+    const double value = knob_value(knob, options);
+    if (!(value >= knob.minimum && value <= knob.maximum)) {
+      return fail(ErrorCode::kInvalidArgument, "{}: {} is outside {} to {} {}", knob.name, value,
+                  knob.minimum, knob.maximum, knob.unit);
+    }
+  }
+  if (options.exposure_min_s > options.exposure_max_s ||
+      options.depth_min_m > options.depth_max_m) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "camera: a minimum (exposure_min_s {}, depth_min_m {}) is above its maximum ({}, {})",
+        options.exposure_min_s, options.depth_min_m, options.exposure_max_s, options.depth_max_m);
+  }
+  if (options.color_format != PixelFormat::kBgr8 && options.color_format != PixelFormat::kGray8) {
+    return fail(ErrorCode::kInvalidArgument,
+                "camera: the colour format is neither kBgr8 nor kGray8");
+  }
+  return {};
+}
+
+/// Intrinsics measured at 640 x 480, at another size.
+CameraIntrinsics scaled(const CameraIntrinsics& vga, int width, int height) {
+  CameraIntrinsics result = vga;
+  const double across = static_cast<double>(width) / vga.width;
+  const double down = static_cast<double>(height) / vga.height;
+  result.width = width;
+  result.height = height;
+  result.fx *= across;
+  result.fy *= down;
+  result.cx = (vga.cx + 0.5) * across - 0.5;
+  result.cy = (vga.cy + 0.5) * down - 0.5;
+  return result;
+}
+
+}  // namespace
+
+std::span<const Knob<CameraOptions>> camera_knobs() {
+  return kKnobs;
+}
+
+// NOLINTBEGIN(readability-magic-numbers): calibrations of real devices
+SE3 d435i_T_cam_ir() {
+  // Published of a D435i (firmware 5.12.14.50): colour in the depth camera's frame.
+  Matrix3d rotation;
+  rotation << 0.999956, -0.009402, -0.000683, 0.009402, 0.999955, -0.000868, 0.000691, 0.000861,
+      0.999999;
+  const SE3 T_ir_cam{rotation, Vector3d{-0.01501, 0.00136, -0.00025}};
+  return T_ir_cam.inverse();
+}
+
+CameraIntrinsics d435i_color_intrinsics(int width, int height) {
+  // The published calibration of the D435i on a Go2.
+  return scaled({.width = 640,
+                 .height = 480,
+                 .fx = 608.758057,
+                 .fy = 608.546509,
+                 .cx = 315.648743,
+                 .cy = 243.935272},
+                width, height);
+}
+
+CameraIntrinsics d435i_ir_intrinsics(int width, int height) {
+  // The middle of several devices.
+  return scaled({.width = 640, .height = 480, .fx = 383.5, .fy = 383.5, .cx = 320.2, .cy = 236.2},
+                width, height);
+}
+// NOLINTEND(readability-magic-numbers)
+
+struct CameraSimulator::Parts {
+  Parts(const Scene& of, const CameraOptions& with, std::unique_ptr<RayScene> traced)
+      : scene{&of},
+        options{with},
+        rays{std::move(traced)},
+        lighting{of, *rays},
+        shader{of, *rays, lighting},
+        registration{.depth = d435i_ir_intrinsics(with.width, with.height),
+                     .color = d435i_color_intrinsics(with.width, with.height),
+                     .T_cam_ir = d435i_T_cam_ir()} {}
+
+  [[nodiscard]] Exposure meter(double t_s, const PoseAt& T_world_cam) const {
+    double luminance_nit = 0;
+    for (const Metering& metering : kMeterings) {
+      const double seen = static_cast<double>(metered_luminance(
+          *rays, shader, registration.color, T_world_cam(t_s - metering.before_s)));
+      luminance_nit += metering.weight * seen;
+    }
+    return choose_exposure(luminance_nit, options);
+  }
+
+  const Scene* scene;
+  CameraOptions options;
+  std::unique_ptr<RayScene> rays;
+  Lighting lighting;
+  Shader shader;
+  Registration registration;
+};
+
+Result<std::unique_ptr<CameraSimulator>> CameraSimulator::create(const Scene& scene,
+                                                                 const CameraOptions& options) {
+  if (const Result<void> checked = check(options); !checked) {
+    return tl::unexpected{checked.error()};
+  }
+  Result<std::unique_ptr<RayScene>> rays = RayScene::create(scene);
+  if (!rays) {
+    return tl::unexpected{rays.error()};
+  }
+  return std::unique_ptr<CameraSimulator>{
+      new CameraSimulator{std::make_unique<Parts>(scene, options, *std::move(rays))}};
+}
+
+CameraSimulator::CameraSimulator(std::unique_ptr<Parts> parts) : parts_{std::move(parts)} {}
+CameraSimulator::~CameraSimulator() = default;
+
+Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_index,
+                                 const PoseAt& T_world_cam) {
+  Parts& parts = *parts_;
+  const CameraOptions& options = parts.options;
+  const std::uint64_t key = subkey(subkey(options.seed, "camera"), frame_index);
+  const double t_depth_s = t_mid_exposure_s + options.depth_offset_s;
+
+  parts.rays->move_people(t_mid_exposure_s, t_mid_exposure_s);
+  parts.shader.move_people(t_mid_exposure_s);
+  const Exposure exposure = parts.meter(t_mid_exposure_s, T_world_cam);
+  const Shutter shutter{.t_mid_s = t_mid_exposure_s,
+                        .exposure_s = exposure.exposure_s,
+                        .readout_s = options.readout_s,
+                        .rows = options.height};
+  Rendered rendered{.color = {},
+                    .depth = {},
+                    .depth_truth = {},
+                    .exposure_s = exposure.exposure_s,
+                    .gain = exposure.gain};
+  parts.rays->move_people(shutter.begin_s(), shutter.end_s());
+  const std::vector<Rgb> light =
+      expose(*parts.rays, parts.shader, parts.registration.color, shutter, T_world_cam,
+             {.rays_a_pixel = options.subexposures, .key = subkey(key, "rays")});
+  rendered.color = develop(light, exposure, options, subkey(key, "sensor"));
+  rendered.depth_truth =
+      true_depth(*parts.rays, parts.registration.color, T_world_cam(t_mid_exposure_s), 0.5F);
+
+  if (!parts.scene->pedestrians.empty()) {
+    parts.rays->move_people(t_depth_s, t_depth_s);
+  }
+  const SE3 T_world_ir = T_world_cam(t_depth_s) * parts.registration.T_cam_ir;
+  const InfraredView seen =
+      see_infrared(*parts.rays, parts.shader, parts.registration.depth, T_world_ir, 0,
+                   static_cast<float>(options.projector_power));
+  const std::vector<float> depth_m =
+      match_stereo(seen, parts.registration.depth, options, subkey(key, "stereo"));
+  rendered.depth = FramePool{1}.acquire(
+      {.width = options.width, .height = options.height, .format = PixelFormat::kDepth16});
+  std::vector<std::uint16_t> millimetres(depth_m.size());
+  align_to_color(depth_m, parts.registration, millimetres);
+  const auto bytes = std::as_bytes(std::span{millimetres});
+  std::ranges::copy(bytes, rendered.depth.writable_bytes().begin());
+  return rendered;
+}
+
+const CameraIntrinsics& CameraSimulator::intrinsics() const noexcept {
+  return parts_->registration.color;
+}
+
+double CameraSimulator::lookback_s() noexcept {
+  return kMeterings.back().before_s;
+}
+
+}  // namespace geoflow::simulator

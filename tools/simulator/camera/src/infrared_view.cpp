@@ -1,0 +1,83 @@
+#include "src/infrared_view.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
+
+#include "src/ray_scene.hpp"
+#include "src/shader.hpp"
+#include "src/tiles.hpp"
+#include "src/view.hpp"
+
+namespace geoflow::simulator {
+namespace {
+
+constexpr float kReferenceReflectance = 0.35F;  // of the floor on which the model was fitted
+// The pattern's share in what the camera sees falls as daylight, full of infrared, grows past this;
+// lamps have little.
+constexpr float kDrowningSun_lux = 2000.0F;
+constexpr float kTextureWeight = 2.0F;  // a contrast of 0.15 counts as a light wall at 1.8 m
+constexpr float kTextureLight_lux =
+    15.0F;  // half of the texture's weight: the infrared cameras' noise
+
+float signal_of(const Surface& surface, float depth_m, float sun_lux, float projector_power) {
+  const Material& material = *surface.material;
+  const float reflectance =
+      material.ir_reflectance >= 0 ? material.ir_reflectance : luminance(surface.albedo);
+  const float mirror = Shader::mirror_reflectance(surface);
+  const float diffuse = reflectance * (1.0F - mirror) * (1.0F - mirror);
+  const float pattern = projector_power * surface.cosine * diffuse /
+                        (kReferenceReflectance * depth_m * depth_m) /
+                        (1.0F + sun_lux / kDrowningSun_lux);
+  const float light = luminance(surface.irradiance) * reflectance +
+                      material.emission_nit * std::numbers::pi_v<float>;
+  const float texture =
+      kTextureWeight * surface.contrast * (1.0F - mirror) * light / (light + kTextureLight_lux);
+  return pattern + texture;
+}
+
+}  // namespace
+
+InfraredView see_infrared(const RayScene& rays, const Shader& shader,
+                          const CameraIntrinsics& intrinsics, const SE3& T_world_ir, float ray_time,
+                          float projector_power) {
+  const View view{T_world_ir};
+  const Pinhole pinhole{intrinsics};
+  const auto width = static_cast<std::size_t>(intrinsics.width);
+  const float sun_lux = shader.sun_lux();
+  InfraredView seen;
+  seen.depth_m.resize(width * static_cast<std::size_t>(intrinsics.height));
+  seen.signal.resize(seen.depth_m.size());
+  for_each_tile(intrinsics.width, intrinsics.height, [&](const Tile& tile) {
+    RayPacket packet;
+    RayScene::reset(packet);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const Eigen::Vector3f local =
+          pinhole.direction(static_cast<float>(tile.x(i)), static_cast<float>(tile.y(i)));
+      aim(packet, i, view.p_world_cam, view.R_world_cam * local);
+      packet.ray.time[i] = ray_time;
+    }
+    rays.trace(tile.valid, packet);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (tile.valid[i] == 0 || packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+        continue;
+      }
+      const std::size_t pixel =
+          static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i));
+      const Surface surface =
+          shader.surface(packet, i, {.footprint_per_t = pinhole.inverse_fx, .spread = 1, .key = 0});
+      seen.depth_m[pixel] = packet.ray.tfar[i];
+      seen.signal[pixel] = signal_of(surface, packet.ray.tfar[i], sun_lux, projector_power);
+    }
+  });
+  return seen;
+}
+
+}  // namespace geoflow::simulator

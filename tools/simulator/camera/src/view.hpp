@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+
+#include "src/ray_scene.hpp"
+
+namespace geoflow::simulator {
+
+/// A camera's pose at one moment, in single precision.
+struct View {
+  Eigen::Matrix3f R_world_cam = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f p_world_cam = Eigen::Vector3f::Zero();
+
+  View() = default;
+  explicit View(const SE3& T_world_cam)
+      : R_world_cam{T_world_cam.rotation_matrix().cast<float>()},
+        p_world_cam{T_world_cam.translation().cast<float>()} {}
+};
+
+/// Pixels to directions with z = 1, so that a ray's parameter is depth along the optical axis.
+struct Pinhole {
+  float inverse_fx = 1;
+  float inverse_fy = 1;
+  float cx = 0;
+  float cy = 0;
+
+  explicit Pinhole(const CameraIntrinsics& intrinsics)
+      : inverse_fx{static_cast<float>(1.0 / intrinsics.fx)},
+        inverse_fy{static_cast<float>(1.0 / intrinsics.fy)},
+        cx{static_cast<float>(intrinsics.cx)},
+        cy{static_cast<float>(intrinsics.cy)} {}
+
+  [[nodiscard]] Eigen::Vector3f direction(float x, float y) const {
+    return {(x - cx) * inverse_fx, (y - cy) * inverse_fy, 1.0F};
+  }
+};
+
+/// Aims one lane of a packet.
+inline void aim(RayPacket& packet, std::size_t lane, const Eigen::Vector3f& origin,
+                const Eigen::Vector3f& direction) {
+  packet.ray.org_x[lane] = origin.x();
+  packet.ray.org_y[lane] = origin.y();
+  packet.ray.org_z[lane] = origin.z();
+  packet.ray.dir_x[lane] = direction.x();
+  packet.ray.dir_y[lane] = direction.y();
+  packet.ray.dir_z[lane] = direction.z();
+}
+
+}  // namespace geoflow::simulator
