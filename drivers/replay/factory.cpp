@@ -13,6 +13,7 @@
 #include "replay/euroc/reader.hpp"
 #include "replay/openloris/reader.hpp"
 #include "replay/reader.hpp"
+#include "replay/scannet/reader.hpp"
 #include "replay/tum/reader.hpp"
 
 namespace geoflow::drivers {
@@ -40,6 +41,9 @@ constexpr std::array kFormats = {
     Format{.description = "TUM RGB-D (rgb.txt and depth.txt, or associations.txt)",
            .looks_like = tum::looks_like,
            .open = [](const RecordingOptions& options) { return tum::open(options.path); }},
+    Format{.description = "ScanNet (a .sens file)",
+           .looks_like = scannet::looks_like,
+           .open = [](const RecordingOptions& options) { return scannet::open(options.path); }},
     Format{.description =
                "EuRoC IMU (a .csv file, or mav0/imu0/data.csv, imu0/data.csv, imu.csv, data.csv)",
            .looks_like = [](const Path& path) { return euroc::find_csv(path).has_value(); },

@@ -16,6 +16,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 
 /// What every recording format is turned into: one sequence of events in order of arrival.
 namespace geoflow::drivers {
@@ -79,6 +80,9 @@ class RecordingReader {
   [[nodiscard]] virtual const RecordingInfo& info() const = 0;
   [[nodiscard]] virtual FoundCalibration calibration() const { return {}; }
   [[nodiscard]] virtual RecordingStamps stamps() const { return {}; }
+
+  /// Poses of the colour camera that the recording holds as its own truth; empty where it has none.
+  [[nodiscard]] virtual Trajectory reference() const { return {}; }
 
   /// The faults of the events returned so far; null where no fault script is at work.
   [[nodiscard]] virtual const FaultCounters* faults() const { return nullptr; }

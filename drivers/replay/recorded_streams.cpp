@@ -20,6 +20,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 
 #include "replay/calibration/find.hpp"
 #include "replay/decode.hpp"
@@ -68,6 +69,7 @@ class RecordedStreams::Implementation {
                  const RecordingOptions& options)
       : info_{reader->info()},
         calibration_{std::move(calibration)},
+        reference_{reader->reference()},
         camera_{reader->stamps().camera},
         imu_{reader->stamps().imu},
         legs_{reader->stamps().legs},
@@ -124,6 +126,7 @@ class RecordedStreams::Implementation {
 
   [[nodiscard]] const RecordingInfo& info() const { return info_; }
   [[nodiscard]] const Calibration& calibration() const { return calibration_; }
+  [[nodiscard]] const Trajectory& reference() const { return reference_; }
   [[nodiscard]] const FaultCounters& faults() const { return faults_; }
   [[nodiscard]] HostTime now() const { return now_; }
   [[nodiscard]] Duration shift() const { return shift_; }
@@ -190,6 +193,7 @@ class RecordedStreams::Implementation {
 
   RecordingInfo info_;
   Calibration calibration_;
+  Trajectory reference_;
   Port<CameraSink> camera_;
   Port<ImuSink> imu_;
   Port<LegSink> legs_;
@@ -232,6 +236,9 @@ const RecordingInfo& RecordedStreams::info() const {
 }
 const Calibration& RecordedStreams::calibration() const {
   return implementation_->calibration();
+}
+const Trajectory& RecordedStreams::reference() const {
+  return implementation_->reference();
 }
 FaultCounters RecordedStreams::faults() const {
   return implementation_->faults();

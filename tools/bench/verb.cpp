@@ -1,10 +1,9 @@
 #include "geoflow/tools/verb.hpp"
 
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <system_error>
+#include <utility>
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -14,12 +13,14 @@
 
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/tools/bench/processes.hpp"
 #include "geoflow/tools/bench/replay_benchmark.hpp"
 #include "geoflow/tools/bench/table.hpp"
 #include "geoflow/tools/console.hpp"
 
 #include "bench/gicp_benchmark.hpp"
 #include "bench/gicp_table.hpp"
+#include "bench/table_command.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -27,45 +28,53 @@ namespace {
 constexpr int kMaxRuns = 1000;
 constexpr int kMaxPairs = 100'000;
 
-/// `geoflow bench BENCHMARK RECORDING`.
+constexpr std::string_view kExamples =
+    "  geoflow bench replay kitchen-400 --runs 5        frames a second, stage times and "
+    "memory of five runs\n"
+    "  geoflow bench replay kitchen-400 --csv           the same for a spreadsheet\n"
+    "  geoflow bench gicp kitchen-400 --pairs 100       registration of depth frames beside "
+    "PCL's, times and errors\n"
+    "  geoflow bench table --suite tum --data ~/tum     accuracy on a whole data set, in "
+    "the "
+    "paper's ablation rows\n"
+    "  geoflow bench replay kitchen-400 --json          the same for scripts, with the "
+    "machine\n"
+    "How to measure so that figures can be compared: docs/benchmarks.md.";
+
+/// `geoflow bench BENCHMARK …`.
 class BenchVerb final : public Verb {
  public:
   [[nodiscard]] std::string_view name() const override { return "bench"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "Measure speed and memory on this machine, as a table";
+    return "Measure speed, memory and accuracy on this machine, as a table";
   }
-  [[nodiscard]] std::string_view examples() const override {
-    return "  geoflow bench replay kitchen-400 --runs 5        frames a second, stage times and "
-           "memory of five runs\n"
-           "  geoflow bench replay kitchen-400 --csv           the same for a spreadsheet\n"
-           "  geoflow bench gicp kitchen-400 --pairs 100       registration of depth frames beside "
-           "PCL's, times and errors\n"
-           "  geoflow bench replay kitchen-400 --json          the same for scripts, with the "
-           "machine\n"
-           "How to measure so that figures can be compared: docs/benchmarks.md.";
-  }
+  [[nodiscard]] std::string_view examples() const override { return kExamples; }
 
   void declare(CLI::App& command) override {
-    command
-        .add_option("BENCHMARK", benchmark_,
-                    "What to measure: replay, or gicp (frame-to-frame registration beside PCL's)")
-        ->required()
-        ->check(CLI::IsMember({"replay", "gicp"}).description(""));
-    command.add_option("RECORDING", recording_, "Folder of the recording")->required();
-    command.add_option("--runs", runs_, "replay: how many times")
+    command.require_subcommand(1);
+    replay_ = add(command, "replay", "Replay a recording: speed, memory, stage times");
+    add_recording(*replay_);
+    replay_->add_option("--runs", runs_, "How many times")
         ->check(CLI::Range(1, kMaxRuns))
         ->capture_default_str();
-    command.add_option("--calibration", calibration_,
-                       "Folder with Kalibr files (default: the recording's)");
-    command.add_option("--reference", reference_,
-                       "gicp: TUM file of camera poses (default: groundtruth.txt in RECORDING)");
-    command.add_option("--pairs", pairs_, "gicp: pairs of frames for each step")
+    replay_->add_option("--calibration", calibration_,
+                        "Folder with Kalibr files (default: the recording's)");
+    gicp_ = add(command, "gicp", "Register depth frame to frame, beside PCL");
+    add_recording(*gicp_);
+    gicp_->add_option("--reference", reference_,
+                      "TUM file of camera poses (default: groundtruth.txt in RECORDING)");
+    gicp_->add_option("--pairs", pairs_, "Pairs of frames for each step")
         ->check(CLI::Range(1, kMaxPairs))
         ->capture_default_str();
-    command.add_flag("--csv", csv_, "Print CSV instead of a Markdown table");
+    CLI::App* table = add(command, "table", "Run a whole data set in the paper's ablation rows");
+    table->footer("Examples:\n" + std::string{TableCommand::examples()});
+    table_.declare(*table);
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
+    if (!replay_->parsed() && !gicp_->parsed()) {
+      return table_.run(console);
+    }
     return measure().map([&](const BenchTable& table) {
       print(console, table);
       return ExitCode::kOk;
@@ -73,21 +82,32 @@ class BenchVerb final : public Verb {
   }
 
  private:
+  /// A benchmark; what is none of its options is the verb's (`--json`).
+  static CLI::App* add(CLI::App& command, const std::string& name, const std::string& summary) {
+    CLI::App* benchmark = command.add_subcommand(name, summary);
+    benchmark->fallthrough();
+    return benchmark;
+  }
+
+  void add_recording(CLI::App& benchmark) {
+    benchmark.add_option("RECORDING", recording_, "Folder of the recording")->required();
+    benchmark.add_flag("--csv", csv_, "Print CSV instead of a Markdown table");
+  }
+
   [[nodiscard]] Result<BenchTable> measure() const {
-    if (benchmark_ == "gicp") {
+    if (gicp_->parsed()) {
       GicpBenchmarkOptions options{.recording = recording_, .pairs = pairs_};
       if (!reference_.empty()) {
         options.reference = reference_;
       }
       return run_gicp_table(options);
     }
-    std::error_code status;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", status);
-    if (status) {
-      return fail(ErrorCode::kSystem, "/proc/self/exe: {}", status.message());
-    }
-    return run_replay_benchmark(
-        {.program = program, .recording = recording_, .calibration = calibration_, .runs = runs_});
+    return own_program().and_then([&](const auto& program) {
+      return run_replay_benchmark({.program = program,
+                                   .recording = recording_,
+                                   .calibration = calibration_,
+                                   .runs = runs_});
+    });
   }
 
   void print(Console& console, const BenchTable& table) const {
@@ -102,7 +122,9 @@ class BenchVerb final : public Verb {
     console.line("{}", text);
   }
 
-  std::string benchmark_;
+  CLI::App* replay_ = nullptr;
+  CLI::App* gicp_ = nullptr;
+  TableCommand table_;
   std::string recording_;
   std::string calibration_;
   std::string reference_;

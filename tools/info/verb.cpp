@@ -17,7 +17,9 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 #include "geoflow/tools/console.hpp"
+#include "geoflow/tools/trajectory_file.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -70,12 +72,16 @@ class InfoVerb final : public Verb {
   [[nodiscard]] std::string_view summary() const override { return "Say what a recording holds"; }
   [[nodiscard]] std::string_view examples() const override {
     return "  geoflow info kitchen-400            format, duration, streams, calibration\n"
-           "  geoflow info bag --json             the same for scripts; keys in docs/cli.md";
+           "  geoflow info bag --json             the same for scripts; keys in docs/cli.md\n"
+           "  geoflow info scene0050_00.sens --reference groundtruth.txt\n"
+           "      write the camera poses that the recording holds as its truth, as TUM text";
   }
 
   void declare(CLI::App& command) override {
     command.add_option("recording", recording_, "The recording's folder")->required();
     command.add_option("--calibration", calibration_, "Folder with Kalibr files");
+    command.add_option("--reference", reference_,
+                       "Write the recording's own true camera poses to this file");
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
@@ -88,13 +94,28 @@ class InfoVerb final : public Verb {
       return tl::unexpected{streams.error()};
     }
     json object = to_json((*streams)->info());
+    const Trajectory& reference = (*streams)->reference();
     object["calibration"] = to_json((*streams)->calibration());
+    object["reference_poses"] = reference.size();
     console.object(object);
     print((*streams)->info(), (*streams)->calibration(), console);
-    return ExitCode::kOk;
+    if (!reference.empty()) {
+      console.line("reference    {} true camera poses", reference.size());
+    }
+    return write_reference(reference).map([] { return ExitCode::kOk; });
   }
 
  private:
+  [[nodiscard]] Result<void> write_reference(const Trajectory& reference) const {
+    if (reference_.empty()) {
+      return {};
+    }
+    if (reference.empty()) {
+      return fail(ErrorCode::kNotFound, "{}: holds no true poses of its own", recording_);
+    }
+    return write_tum(reference_, reference);
+  }
+
   static void print(const drivers::RecordingInfo& info, const Calibration& calibration,
                     Console& console) {
     console.line("format       {}", info.format);
@@ -119,6 +140,7 @@ class InfoVerb final : public Verb {
 
   std::string recording_;
   std::string calibration_;
+  std::string reference_;
 };
 
 }  // namespace

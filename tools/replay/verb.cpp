@@ -46,7 +46,9 @@ class ReplayVerb final : public Verb {
   }
 
   void declare(CLI::App& command) override {
-    command.add_option("recording", recording_, "TUM RGB-D, rosbag2, OpenLORIS or EuRoC folder")
+    command
+        .add_option("recording", recording_,
+                    "TUM RGB-D, rosbag2, OpenLORIS or EuRoC folder, or .sens file")
         ->required();
     command.add_option("-o,--output", output_, "Folder for the results; made if it is not there")
         ->required();

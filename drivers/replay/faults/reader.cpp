@@ -16,6 +16,7 @@
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 
 #include "replay/faults/script.hpp"
 #include "replay/faults/stage.hpp"
@@ -45,6 +46,7 @@ class FaultReader final : public RecordingReader {
 
   [[nodiscard]] const RecordingInfo& info() const override { return inner_->info(); }
   [[nodiscard]] FoundCalibration calibration() const override { return inner_->calibration(); }
+  [[nodiscard]] Trajectory reference() const override { return inner_->reference(); }
   [[nodiscard]] RecordingStamps stamps() const override { return stamps_; }
   [[nodiscard]] bool complete() const override { return inner_->complete(); }
   [[nodiscard]] const FaultCounters* faults() const override { return &counters_; }

@@ -1,7 +1,5 @@
 #include "geoflow/tools/bench/replay_benchmark.hpp"
 
-#include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,15 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/tools/bench/processes.hpp"
 #include "geoflow/tools/bench/table.hpp"
 
 namespace geoflow::tools {
@@ -57,34 +53,16 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Starts the command with standard output discarded and standard error kept, and waits for its
-/// end.
+/// Runs the command alone and waits for its end.
 Result<void> run_command(std::vector<std::string> arguments) {
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) {
-    argv.push_back(argument.data());
+  const Command command{.arguments = std::move(arguments)};
+  const auto ended = run_processes({&command, 1}, 1, [](std::size_t /*done*/) { return true; });
+  if (!ended) {
+    return tl::unexpected{ended.error()};
   }
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t child = 0;
-  const int status = ::posix_spawn(&child, argv.front(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (status != 0) {
-    return fail(ErrorCode::kSystem, "{}: {}", arguments.front(),
-                std::generic_category().message(status));
-  }
-  int ended = 0;
-  while (::waitpid(child, &ended, 0) < 0) {
-    if (errno != EINTR) {
-      return fail_errno("waiting for the replay");
-    }
-  }
-  if (!WIFEXITED(ended) || WEXITSTATUS(ended) != 0) {
-    return fail(ErrorCode::kSystem, "the replay failed ({} {}); its message is above",
-                WIFEXITED(ended) ? "exit code" : "signal",
-                WIFEXITED(ended) ? WEXITSTATUS(ended) : WTERMSIG(ended));
+  if (!ended->front().well()) {
+    return fail(ErrorCode::kSystem, "the replay failed ({}); its message is above",
+                ended->front().how());
   }
   return {};
 }

@@ -13,6 +13,7 @@
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 
 /// Recorded streams behind the same ports as devices.
 namespace geoflow::drivers {
@@ -52,7 +53,7 @@ struct StreamSummary {
 };
 
 struct RecordingInfo {
-  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `euroc`
+  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `scannet`, `euroc`
   HostTime start;      ///< stamp of the first sample, on the recording's time line
   HostTime end;        ///< stamp of the last sample
   std::vector<StreamSummary> streams;
@@ -90,6 +91,9 @@ class RecordedStreams {
   [[nodiscard]] const RecordingInfo& info() const;
   /// A recording without images has the default one.
   [[nodiscard]] const Calibration& calibration() const;
+  /// Poses of the colour camera that the recording holds as its own truth (ScanNet), in a world of
+  /// its own, on the recording's time line; empty where it has none.
+  [[nodiscard]] const Trajectory& reference() const;
   /// Of the samples delivered so far.
   [[nodiscard]] FaultCounters faults() const;
 
