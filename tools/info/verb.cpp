@@ -21,6 +21,8 @@
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
+#include "info/sheet.hpp"
+
 namespace geoflow::tools {
 namespace {
 
@@ -73,6 +75,7 @@ class InfoVerb final : public Verb {
   [[nodiscard]] std::string_view examples() const override {
     return "  geoflow info kitchen-400            format, duration, streams, calibration\n"
            "  geoflow info bag --json             the same for scripts; keys in docs/cli.md\n"
+           "  geoflow info bag --sheet sheet.png  a few of its images beside their depth\n"
            "  geoflow info scene0050_00.sens --reference groundtruth.txt\n"
            "      write the camera poses that the recording holds as its truth, as TUM text";
   }
@@ -80,6 +83,8 @@ class InfoVerb final : public Verb {
   void declare(CLI::App& command) override {
     command.add_option("recording", recording_, "The recording's folder")->required();
     command.add_option("--calibration", calibration_, "Folder with Kalibr files");
+    command.add_option("--sheet", sheet_,
+                       "Draw a few of its images, with depth, to this .png file");
     command.add_option("--reference", reference_,
                        "Write the recording's own true camera poses to this file");
   }
@@ -102,7 +107,9 @@ class InfoVerb final : public Verb {
     if (!reference.empty()) {
       console.line("reference    {} true camera poses", reference.size());
     }
-    return write_reference(reference).map([] { return ExitCode::kOk; });
+    return write_reference(reference)
+        .and_then([&] { return sheet_.empty() ? Result<void>{} : draw_sheet(**streams, sheet_); })
+        .map([] { return ExitCode::kOk; });
   }
 
  private:
@@ -141,6 +148,7 @@ class InfoVerb final : public Verb {
   std::string recording_;
   std::string calibration_;
   std::string reference_;
+  std::string sheet_;
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,6 +19,7 @@
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/pose_client.hpp"
 #include "geoflow/daemon/records.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
@@ -25,6 +27,7 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
+#include "geoflow/tools/trajectory_file.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -36,6 +39,17 @@ constexpr auto kWaitSlice = std::chrono::milliseconds{200};
 constexpr double kHighestRateHz = 1000;
 constexpr double kMillisecondsPerNanosecond = 1e-6;
 constexpr double kDegreesPerRadian = 57.29577951308232;
+
+constexpr std::string_view kExamples =
+    "  geoflow pose                              every pose, one a line, until the daemon "
+    "ends or Ctrl-C\n"
+    "  geoflow pose --once --json                the newest pose as one JSON object\n"
+    "  geoflow pose --rate 2                     two a second\n"
+    "  geoflow pose --json | jq .p_odom_base     for scripts\n"
+    "  geoflow pose --tum live.txt               the poses in the map to a file, for "
+    "geoflow "
+    "evaluate\n"
+    "Any number of them may run at once. The keys of the JSON: docs/protocol.md.";
 
 /// T_map_base as p and q of the record's two transforms.
 SE3 map_from_base(const geoflow_pose& pose) {
@@ -90,14 +104,7 @@ class PoseVerb final : public Verb {
   [[nodiscard]] std::string_view summary() const override {
     return "Show the live pose from the daemon's socket";
   }
-  [[nodiscard]] std::string_view examples() const override {
-    return "  geoflow pose                              every pose, one a line, until the daemon "
-           "ends or Ctrl-C\n"
-           "  geoflow pose --once --json                the newest pose as one JSON object\n"
-           "  geoflow pose --rate 2                     two a second\n"
-           "  geoflow pose --json | jq .p_odom_base     for scripts\n"
-           "Any number of them may run at once. The keys of the JSON: docs/protocol.md.";
-  }
+  [[nodiscard]] std::string_view examples() const override { return kExamples; }
 
   void declare(CLI::App& command) override {
     command.add_option("--socket", socket_, "The daemon's pose socket")->capture_default_str();
@@ -106,6 +113,9 @@ class PoseVerb final : public Verb {
         ->capture_default_str();
     command.add_option("--count", count_, "End after so many poses; 0: do not");
     command.add_flag("--once", once_, "End after one pose");
+    command.add_option("--tum", tum_,
+                       "Also write base_link in the map to this file as TUM text, at the times of "
+                       "the recording");
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
@@ -113,11 +123,25 @@ class PoseVerb final : public Verb {
     if (!client) {
       return tl::unexpected{std::move(client.error())};
     }
+    std::ofstream trajectory;
+    if (!tum_.empty()) {
+      trajectory.open(tum_, std::ios::binary | std::ios::trunc);
+    }
+    auto code = follow(*client, console, trajectory);
+    if (!tum_.empty() && !trajectory.flush()) {
+      return fail(ErrorCode::kSystem, "{}: cannot be written", tum_);
+    }
+    return code;
+  }
+
+ private:
+  [[nodiscard]] Result<ExitCode> follow(PoseClient& client, Console& console,
+                                        std::ofstream& trajectory) const {
     const InterruptScope interrupt;
     const std::uint64_t wanted = once_ ? 1 : count_;
     std::uint64_t shown = 0;
     while (!InterruptScope::requested()) {
-      auto received = client->receive(kWaitSlice);
+      auto received = client.receive(kWaitSlice);
       if (!received) {
         return tl::unexpected{std::move(received.error())};
       }
@@ -126,6 +150,11 @@ class PoseVerb final : public Verb {
       }
       if (const auto* pose = std::get_if<ReceivedPose>(&*received)) {
         show(*pose, console);
+        if (daemon::has_pose(static_cast<TrackingStatus>(pose->pose.status))) {
+          trajectory << format_tum_line({HostTime{Duration{pose->pose.t_recording_ns}},
+                                         map_from_base(pose->pose)})
+                     << '\n';
+        }
         if (++shown == wanted) {
           break;
         }
@@ -134,7 +163,6 @@ class PoseVerb final : public Verb {
     return ExitCode::kOk;
   }
 
- private:
   [[nodiscard]] static Result<ExitCode> end(const PoseClient::Ended& ended, std::uint64_t shown) {
     if (ended.reason == 0 || shown == 0) {
       return fail(ErrorCode::kUnavailable, "the daemon {}",
@@ -155,6 +183,7 @@ class PoseVerb final : public Verb {
   double rate_hz_ = 0;
   std::uint64_t count_ = 0;
   bool once_ = false;
+  std::string tum_;
 };
 
 }  // namespace

@@ -22,6 +22,7 @@
 #include "bench/suite/plan.hpp"
 #include "bench/suite/published.hpp"
 #include "bench/suite/sequences.hpp"
+#include "bench/suite/simulated.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -133,6 +134,29 @@ TEST(Sequences, AnEmptyFolderSaysWhatWasLookedFor) {
   EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(none.error().message, HasSubstr(".sens files"));
   EXPECT_FALSE(find_sequences(Suite::kTum, data.path() / "nowhere"));
+}
+
+TEST(Simulated, SeedsAreNumbersAndRanges) {
+  EXPECT_THAT(parse_seeds("1-3,8").value(), ElementsAre(1U, 2U, 3U, 8U));
+  for (const char* const wrong : {"x", "1-", "3-1", "1,,2", "-1", "0-99999999", "1 "}) {
+    const auto seeds = parse_seeds(wrong);
+    ASSERT_FALSE(seeds) << wrong;
+    EXPECT_THAT(seeds.error().message, HasSubstr("--seeds"));
+  }
+}
+
+TEST(Simulated, EverySceneWithEverySeed) {
+  const auto planned = plan_recordings({.program = "/bin/geoflow",
+                                        .data = "/data",
+                                        .scenes = {"office", "plaza"},
+                                        .seeds = {1, 7},
+                                        .duration_s = 12.5});
+  ASSERT_EQ(planned.size(), 4U);
+  EXPECT_EQ(planned[3].sequence.name, "plaza-7");
+  EXPECT_EQ(planned[3].sequence.reference, "/data/plaza-7/groundtruth.txt");
+  EXPECT_THAT(planned[3].make,
+              ElementsAre("/bin/geoflow", "simulate", "plaza", "-o", "/data/plaza-7", "--seed", "7",
+                          "--duration", "12.5", "--gray", "--reuse"));
 }
 
 TEST(Plan, EveryRowOnEverySequence) {

@@ -1,9 +1,14 @@
 #include "plot/src/canvas.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <cairo-svg.h>
 #include <cairo.h>
@@ -121,6 +126,28 @@ void Canvas::fill(const Box& box, const Color& color, double opacity) {
 void Canvas::outline(const Box& box, const Stroke& line) {
   cairo_rectangle(context_.get(), box.x, box.y, box.width, box.height);
   stroke(line);
+}
+
+void Canvas::pixels(double x, double y, int width, const std::vector<Color>& picture) {
+  constexpr double kBrightest = 255;
+  const auto byte = [](double value) {
+    return static_cast<std::uint32_t>(std::lround(std::clamp(value, 0.0, 1.0) * kBrightest));
+  };
+  std::vector<std::uint32_t> values;  // CAIRO_FORMAT_RGB24: red in bits 16 to 23
+  values.reserve(picture.size());
+  for (const Color& color : picture) {
+    values.push_back(byte(color.red) << 16U | byte(color.green) << 8U | byte(color.blue));
+  }
+  const int height = static_cast<int>(picture.size()) / width;
+  void* const memory = values.data();
+  const std::unique_ptr<cairo_surface_t, Destroy> image{cairo_image_surface_create_for_data(
+      static_cast<unsigned char*>(memory), CAIRO_FORMAT_RGB24, width, height,
+      width * static_cast<int>(sizeof(std::uint32_t)))};
+  cairo_set_source_surface(context_.get(), image.get(), x, y);
+  cairo_rectangle(context_.get(), x, y, width, height);
+  cairo_fill(context_.get());
+  cairo_set_source_rgb(context_.get(), 0, 0, 0);  // lets go of the image, whose pixels go now
+  cairo_surface_finish(image.get());
 }
 
 void Canvas::clip(const Box& box) {

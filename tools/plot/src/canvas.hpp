@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/plot.hpp"
@@ -59,6 +60,9 @@ class Canvas {
 
   void fill(const Box& box, const Color& color, double opacity = 1.0);
   void outline(const Box& box, const Stroke& stroke);
+
+  /// A picture of `width` columns, row by row, one unit a pixel; (x, y) is its upper left corner.
+  void pixels(double x, double y, int width, const std::vector<Color>& picture);
 
   /// Until unclip(), only what lies in the box is drawn. Not nested.
   void clip(const Box& box);
