@@ -48,12 +48,14 @@ template <typename Options>
 
 template <typename Options>
 [[nodiscard]] KnobInfo describe(const Knob<Options>& knob) {
+  // Static: GCC 12 takes members of types that no knob has for uninitialised in a temporary.
+  static const Options defaults{};
   return {.name = knob.name,
           .unit = knob.unit,
           .summary = knob.summary,
           .minimum = knob.minimum,
           .maximum = knob.maximum,
-          .fallback = knob_value(knob, Options{}),
+          .fallback = knob_value(knob, defaults),
           .whole = !std::holds_alternative<double Options::*>(knob.member)};
 }
 

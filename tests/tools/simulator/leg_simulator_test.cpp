@@ -1,0 +1,183 @@
+#include "geoflow/tools/simulator/leg_simulator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/leg_kinematics.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/support_forces.hpp"
+#include "geoflow/tools/simulator/walk.hpp"
+#include "geoflow/tools/simulator/walk_options.hpp"
+
+#include "walk_fixture.hpp"
+
+namespace geoflow::simulator {
+namespace {
+
+using tests::walk_for;
+
+TEST(LegSimulator, TorquesHoldTheSupportForceExactly) {
+  const Walk walk = walk_for(12);
+  const LegSimulator legs{walk, 1, exact_legs()};
+  for (std::size_t i = 0; i < legs.size(); i += 7) {
+    const LegReading reading = legs.reading(i);
+    const BodyState body = walk.body().at(reading.t_s);
+    const Matrix3d R_world_base = body.T_world_base.rotation_matrix();
+    const Vector3d up_in_base = R_world_base.transpose() * Vector3d::UnitZ();
+    Vector3d sum = Vector3d::Zero();
+    for (const Leg leg : kAllLegs) {
+      const LegJoints joints = joints_of(reading.sample, leg);
+      const Matrix3d J =
+          foot_contact(kGo2Legs, leg, joints.q_rad, up_in_base, kGo2Legs.foot_radius_m).jacobian;
+      const auto force = ground_force(J, joints.tau_nm);
+      ASSERT_TRUE(force.has_value());
+      sum += R_world_base * *force;
+      EXPECT_LT(
+          (R_world_base * *force - reading.truth.force_world.at(static_cast<std::size_t>(leg)))
+              .norm(),
+          1e-9);
+    }
+    EXPECT_LT((sum - required_wrench(body).force).norm(), 1e-9);
+  }
+}
+
+TEST(LegSimulator, AStandingGo2WeighsWhatARealOneDoes) {
+  const Walk walk = walk_for(4);
+  LegSensorOptions options = exact_legs();
+  options.leg_mass_scale = 1;
+  const LegSimulator legs{walk, 1, options};
+  const LegReading reading = legs.reading(500);
+  double weight = 0;
+  std::array<double, kLegCount> by_foot{};
+  for (const Leg leg : kAllLegs) {
+    const LegJoints joints = joints_of(reading.sample, leg);
+    const auto force = ground_force(foot_jacobian(kGo2Legs, leg, joints.q_rad), joints.tau_nm);
+    ASSERT_TRUE(force.has_value());
+    by_foot.at(static_cast<std::size_t>(leg)) = force->z();
+    weight += force->z();
+  }
+  // A real one: 147.3 N, of which front right, front left, rear right, rear
+  // left 42.1, 43.6, 31.2, 30.5. To a newton: a motor's smallest step of torque, at each of the
+  // four knees.
+  EXPECT_NEAR(weight, 147.3, 1);
+  EXPECT_NEAR(by_foot[0] + by_foot[1], 85.7, 2);
+  EXPECT_NEAR(by_foot[2] + by_foot[3], 61.7, 2);
+}
+
+TEST(LegSimulator, ForcesPushAndStayWithinFriction) {
+  std::vector<double> ratios;
+  int pulling = 0;
+  int stances = 0;
+  for (const bool pronounced : {false, true}) {
+    const Walk walk = walk_for(20, pronounced ? with_pronounced_trot({}) : WalkOptions{});
+    const LegSimulator legs{walk, 1, exact_legs()};
+    for (std::size_t i = 0; i < legs.size(); i += 3) {
+      const LegTruth truth = legs.truth(static_cast<double>(i) / 500);
+      for (std::size_t l = 0; l < kLegCount; ++l) {
+        const Vector3d& force = truth.force_world.at(l);
+        if (!truth.contact.at(l)) {
+          EXPECT_EQ(force.norm(), 0);
+          continue;
+        }
+        ++stances;
+        pulling += static_cast<int>(force.z() < -1e-9);
+        if (force.z() > 10 && !pronounced) {
+          ratios.push_back(force.head<2>().norm() / force.z());
+        }
+      }
+    }
+  }
+  std::ranges::sort(ratios);
+  const double usual = ratios.at(ratios.size() * 95 / 100);
+  RecordProperty("friction_ratio_p95", std::to_string(usual));
+  EXPECT_LT(usual, 0.6);  // rubber on a floor holds
+  EXPECT_LT(pulling, stances / 1000);
+}
+
+TEST(LegSimulator, NoiseIsThatOfARealGo2) {
+  WalkOptions standing;
+  standing.speed_mps = 0;
+  const Walk walk = walk_for(10, standing);
+  const LegSimulator legs{walk, 3, {}};
+  std::array<double, kJointsPerLeg> squares{};
+  for (std::size_t i = 0; i < legs.size(); ++i) {
+    for (const Leg leg : kAllLegs) {
+      const LegJoints joints = joints_of(legs.reading(i).sample, leg);
+      for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+        squares.at(j) += std::pow(joints.dq_radps[static_cast<Eigen::Index>(j)], 2);
+      }
+    }
+  }
+  const auto rms = [&](std::size_t j) {
+    return std::sqrt(squares.at(j) / static_cast<double>(kLegCount * legs.size()));
+  };
+  EXPECT_NEAR(rms(0), 0.029, 0.002);
+  EXPECT_NEAR(rms(1), 0.047, 0.002);
+  EXPECT_NEAR(rms(2), 0.013, 0.001);
+}
+
+TEST(LegSimulator, FootForceLagsAndHasAnOffsetByFoot) {
+  const Walk walk = walk_for(15);
+  LegSensorOptions options;
+  options.force_noise_counts = 0;
+  const LegSimulator legs{walk, 5, options};
+  // The step response: 10 to 90 percent of a plateau takes the rise time by definition of the lag,
+  // so what is seen after landing is later than the true force.
+  std::array<double, kLegCount> lowest{};
+  lowest.fill(1e9);
+  double lag_product = 0;
+  double product = 0;
+  for (std::size_t i = 2500; i + 20 < legs.size(); ++i) {
+    const LegReading now = legs.reading(i);
+    for (std::size_t l = 0; l < kLegCount; ++l) {
+      const double counts = static_cast<double>(now.sample.foot_force.at(l));
+      lowest.at(l) = std::min(lowest.at(l), counts);
+      const double later = static_cast<double>(legs.reading(i + 12).sample.foot_force.at(l));
+      product += now.truth.force_world.at(l).z() * counts;
+      lag_product += now.truth.force_world.at(l).z() * later;
+    }
+  }
+  EXPECT_GT(lag_product, product);
+  for (const double counts : lowest) {
+    EXPECT_GE(counts, 9);  // a fifth of the greatest offset
+    EXPECT_LE(counts, 60);
+  }
+  EXPECT_GT(*std::ranges::max_element(lowest) - *std::ranges::min_element(lowest), 1);
+}
+
+TEST(LegSimulator, IsDeterministicAndOneKnobLeavesOtherNoiseAlone) {
+  const Walk walk = walk_for(6);
+  LegSensorOptions louder;
+  louder.torque_noise_nm = 1;
+  const LegReading one = LegSimulator{walk, 4, {}}.reading(2111);
+  const LegReading again = LegSimulator{walk, 4, {}}.reading(2111);
+  const LegReading other = LegSimulator{walk, 4, louder}.reading(2111);
+  for (std::size_t joint = 0; joint < one.sample.joints.size(); ++joint) {
+    EXPECT_EQ(one.sample.joints.at(joint).q_rad, again.sample.joints.at(joint).q_rad);
+    EXPECT_EQ(one.sample.joints.at(joint).dq_radps, other.sample.joints.at(joint).dq_radps);
+    EXPECT_EQ(one.sample.joints.at(joint).tau_nm, again.sample.joints.at(joint).tau_nm);
+    EXPECT_NE(one.sample.joints.at(joint).tau_nm, other.sample.joints.at(joint).tau_nm);
+  }
+  EXPECT_EQ(one.sample.foot_force, other.sample.foot_force);
+}
+
+TEST(LegSimulator, ItsKnobsHoldTheirDefaults) {
+  for (const Knob<LegSensorOptions>& knob : leg_knobs()) {
+    const KnobInfo info = describe(knob);
+    EXPECT_TRUE(info.name.starts_with("legs."));
+    EXPECT_LE(info.minimum, info.fallback) << info.name;
+    EXPECT_GE(info.maximum, info.fallback) << info.name;
+  }
+}
+
+}  // namespace
+}  // namespace geoflow::simulator
