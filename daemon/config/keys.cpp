@@ -74,7 +74,7 @@ void bind_pose(slam::PoseConfig& c, std::vector<Key>& keys) {
   keys.push_back({"slam.pose.pixel_sigma", &pixel_sigma, 0.01, 20});
   keys.push_back({"slam.pose.minimum_visual_inliers", &minimum_inliers, 6, 1000});
   keys.push_back({"slam.pose.pnp_threshold_px", &pnp_px, 0.1, 50});
-  keys.push_back({"slam.pose.gicp_targets", &targets, 1, 20});
+  keys.push_back({"slam.pose.map_targets", &targets, 1, 20});
   keys.push_back({"slam.pose.gicp_surfels", &surfels, 50, 20000});
   keys.push_back({"slam.pose.iterations", &iterations, 1, 100});
 }
@@ -88,19 +88,20 @@ void bind_keyframes(slam::KeyframeConfig& c, std::vector<Key>& keys) {
 }
 
 void bind_mapping(slam::MappingConfig& c, std::vector<Key>& keys) {
-  auto& [window, fixed, gicp_neighbours, iterations, depth_sigma] = c;
+  auto& [window, fixed, map_neighbours, iterations, depth_sigma] = c;
   keys.push_back({"slam.mapping.window", &window, 2, 100});
   keys.push_back({"slam.mapping.fixed", &fixed, 1, 200});
-  keys.push_back({"slam.mapping.gicp_neighbours", &gicp_neighbours, 0, 50});
+  keys.push_back({"slam.mapping.map_neighbours", &map_neighbours, 0, 50});
   keys.push_back({"slam.mapping.iterations", &iterations, 1, 100});
   keys.push_back({"slam.mapping.depth_sigma_at_1m", &depth_sigma, 1e-5, 1});
 }
 
 void bind_slam(slam::Config& c, std::vector<Key>& keys) {
   auto& [switches, features, flow, pose, keyframes, mapping] = c;
-  auto& [optical_flow, gicp] = switches;
+  auto& [optical_flow, gicp, depth_to_map] = switches;
   keys.push_back({"slam.switches.optical_flow", &optical_flow});
   keys.push_back({"slam.switches.gicp", &gicp});
+  keys.push_back({"slam.switches.depth_to_map", &depth_to_map});
   bind_features(features, keys);
   bind_flow(flow, keys);
   bind_pose(pose, keys);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <set>
@@ -156,14 +157,19 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
 std::vector<std::pair<KeyframeId, KeyframeId>> MapBuilder::edges_to_measure(
     const Map& map, KeyframeId newest) const {
   const Keyframe& center = map.keyframe(newest);
-  if (!config_.switches.gicp || !center.cloud) {
+  if (!center.cloud) {
     return {};
   }
   auto overlapping = overlapping_keyframes(map, *center.cloud, center.T_odom_cam, kEdgeOverlap);
-  std::erase_if(overlapping, [&](const OverlappingKeyframe& k) { return k.id == newest; });
+  const auto wanted = [&](KeyframeId id) {
+    const bool consecutive = std::next(map.keyframes().find(id)) == map.keyframes().find(newest);
+    return config_.switches.depth_to_map || (config_.switches.gicp && consecutive);
+  };
+  std::erase_if(overlapping,
+                [&](const OverlappingKeyframe& k) { return k.id == newest || !wanted(k.id); });
   std::vector<std::pair<KeyframeId, KeyframeId>> edges;
   for (const KeyframeId id : registration_targets(
-           overlapping, static_cast<std::size_t>(config_.mapping.gicp_neighbours))) {
+           overlapping, static_cast<std::size_t>(config_.mapping.map_neighbours))) {
     edges.emplace_back(id, newest);
   }
   return edges;

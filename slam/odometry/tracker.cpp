@@ -228,23 +228,23 @@ Tracker::InitialPose Tracker::first_guess(const Map& map, const PosePrior& prior
   return initial;
 }
 
-std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odom_cam,
+std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odom_cam, bool blind,
                                                 double& overlap) const {
   std::vector<DepthTarget> targets;
   if (!current_.cloud) {
     return targets;
   }
+  if (config_.switches.gicp && previous_.cloud && !blind) {
+    targets.push_back({previous_.cloud.get(), previous_.T_odom_cam});
+  }
   if (!current_.anchored) {
-    if (config_.switches.gicp && previous_.cloud) {
-      targets.push_back({previous_.cloud.get(), previous_.T_odom_cam});
-    }
     return targets;
   }
   const auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kTargetOverlap);
   overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
-  if (config_.switches.gicp) {
+  if (config_.switches.depth_to_map) {
     for (const KeyframeId id :
-         registration_targets(overlapping, static_cast<std::size_t>(config_.pose.gicp_targets))) {
+         registration_targets(overlapping, static_cast<std::size_t>(config_.pose.map_targets))) {
       targets.push_back({map.keyframe(id).cloud.get(), map.keyframe(id).T_odom_cam});
     }
   }
@@ -254,7 +254,8 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
 TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   TrackingResult result;
   const PosePrior prior = motion.predict(current_.t);
-  const InitialPose initial = first_guess(map, prior, motion.blind(current_.t));
+  const bool blind = motion.blind(current_.t);
+  const InitialPose initial = first_guess(map, prior, blind);
   result.source = initial.source;
   result.sure = initial.sure;
   result.anchored = current_.anchored;
@@ -262,7 +263,8 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
   const StageScope scope{observer_, Stage::kPoseOptimisation};
   std::vector<std::size_t> feature_of_match;
   const std::vector<VisualMatch> visual = matches(map, &feature_of_match);
-  const std::vector<DepthTarget> targets = depth_targets(map, initial.T_odom_cam, result.overlap);
+  const std::vector<DepthTarget> targets =
+      depth_targets(map, initial.T_odom_cam, blind, result.overlap);
   result.solution = optimiser_.solve(
       {.matches = visual, .cloud = current_.cloud.get(), .targets = targets, .prior = prior},
       initial.T_odom_cam);

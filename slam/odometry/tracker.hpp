@@ -63,9 +63,11 @@ class Tracker {
   /// Looks for the current frame in the map without a prediction. On success its features are those
   /// of the map points in view.
   [[nodiscard]] std::optional<SE3> relocate(const Map& map, const SE3& T_odom_cam_predicted);
-  /// What the frame's depth is registered to at a pose; `overlap` as in TrackingResult.
+  /// What the frame's depth is registered to at a pose: the frame before (GICP between consecutive
+  /// frames), unless `blind` to the motion since, and keyframes (depth to map); `overlap` as in
+  /// TrackingResult.
   [[nodiscard]] std::vector<DepthTarget> depth_targets(const Map& map, const SE3& T_odom_cam,
-                                                       double& overlap) const;
+                                                       bool blind, double& overlap) const;
   /// The frame's features that show map points, and, where asked for, which features they are.
   [[nodiscard]] std::vector<VisualMatch> matches(
       const Map& map, std::vector<std::size_t>* feature_of_match = nullptr) const;

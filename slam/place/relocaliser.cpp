@@ -39,6 +39,9 @@ constexpr PnpEffort kConfirmation{
 /// it is so much, lies on one surface in this share, and leaves no direction open.
 constexpr double kDepthConfirmsSeen = 0.3;
 constexpr double kDepthConfirms = 0.9;
+/// A pose that depth found has the support of the features when as many pairs of descriptors as a
+/// hypothesis needs lie within this of where it puts them [px].
+constexpr double kSupportPx = 8;
 /// Followed points further from where the confirmed pose puts them are wrong [px].
 constexpr double kFollowedPx = 5;
 /// With so many followed the search ends.
@@ -54,8 +57,7 @@ constexpr double kDepthSeen = 0.15;
 
 }  // namespace
 
-std::optional<Relocaliser::Hypothesis> Relocaliser::by_features(const Frame& frame,
-                                                                const Keyframe& keyframe) const {
+std::vector<VisualMatch> Relocaliser::pairs(const Frame& frame, const Keyframe& keyframe) const {
   std::vector<VisualMatch> matches;
   for (const PlaceMatch& match : match_places(*frame.place, *keyframe.place)) {
     const Vector3d& p_cam = keyframe.place->p_cam[match.b];
@@ -65,6 +67,12 @@ std::optional<Relocaliser::Hypothesis> Relocaliser::by_features(const Frame& fra
                          frame.place->p_cam[match.a].z()});
     }
   }
+  return matches;
+}
+
+std::optional<Relocaliser::Hypothesis> Relocaliser::by_features(const Frame& frame,
+                                                                const Keyframe& keyframe) const {
+  const std::vector<VisualMatch> matches = pairs(frame, keyframe);
   const auto solution = solve_pnp(matches, camera_, config_.pose, kHypothesis);
   if (!solution) {
     return std::nullopt;
@@ -90,14 +98,33 @@ Relocaliser::Hypothesis Relocaliser::refined(const Frame& frame, const Keyframe&
       register_clouds(*frame.cloud, *keyframe.cloud, T_keyframe_cam, gicp_);
   const SE3& T_keyframe_cam1 = found.T_target_source;
   const Vector6d moved = (T_keyframe_cam.inverse() * T_keyframe_cam1).log();
-  if (!found.converged || moved.head<3>().norm() > kFarRad || moved.tail<3>().norm() > kFarM) {
+  // Whether the last steps were small enough does not matter here: the depth's agreement is looked
+  // at.
+  if (found.inliers == 0 || moved.head<3>().norm() > kFarRad || moved.tail<3>().norm() > kFarM) {
     return {T_odom_cam, false};
   }
+  return {T_odom_cam * SE3::exp(moved), depth_confirms(frame, keyframe, found)};
+}
+
+bool Relocaliser::depth_confirms(const Frame& frame, const Keyframe& keyframe,
+                                 const RegistrationResult& found) {
   const DepthAgreement depth =
       depth_agreement(*frame.cloud, *keyframe.cloud, found.T_target_source);
-  const bool confirms = found.degenerate_directions == 0 && depth.seen > kDepthConfirmsSeen &&
-                        depth.agreeing > kDepthConfirms * depth.seen;
-  return {T_odom_cam * SE3::exp(moved), confirms};
+  return found.degenerate_directions == 0 && depth.seen > kDepthConfirmsSeen &&
+         depth.agreeing > kDepthConfirms * depth.seen;
+}
+
+bool Relocaliser::features_support(const Frame& frame, const Keyframe& keyframe,
+                                   const SE3& T_odom_cam) const {
+  const SE3 T_cam_odom = T_odom_cam.inverse();
+  const std::vector<VisualMatch> matches = pairs(frame, keyframe);
+  const auto agree = std::count_if(matches.begin(), matches.end(), [&](const VisualMatch& match) {
+    const Vector3d p_cam = T_cam_odom * match.p_odom;
+    return p_cam.z() > 0 && (camera_.project(p_cam) - match.pixel).norm() < kSupportPx;
+  });
+  return static_cast<std::size_t>(agree) >= kHypothesis.least_inliers &&
+         static_cast<double>(agree) >=
+             kHypothesis.least_inlier_share * static_cast<double>(matches.size());
 }
 
 std::vector<FlowSeed> Relocaliser::seeds(const Map& map, KeyframeId id,
@@ -177,7 +204,9 @@ std::optional<Relocation> Relocaliser::by_depth(const Map& map, const Frame& fra
   const SE3& T_keyframe_cam = found.T_target_source;
   const SE3 T_odom_cam = T_odom_keyframe * T_keyframe_cam;
   if (keyframe.points.size() >= kTextured) {
-    return confirmed(map, frame, id, {T_odom_cam, false});
+    const bool certain =
+        depth_confirms(frame, keyframe, found) && features_support(frame, keyframe, T_odom_cam);
+    return confirmed(map, frame, id, {T_odom_cam, certain});
   }
   if (found.overlap < kDepthDecides || found.degenerate_directions > 0) {
     return std::nullopt;

@@ -9,6 +9,7 @@
 #include "cloud/gicp.hpp"
 #include "map/map.hpp"
 #include "odometry/frame.hpp"
+#include "odometry/pose_optimiser.hpp"
 #include "vision/camera_model.hpp"
 #include "vision/dual_stream_flow.hpp"
 
@@ -48,6 +49,12 @@ class Relocaliser {
     SE3 T_odom_cam;
     bool certain;  ///< needs no confirmation by flow
   };
+  /// Features of the keyframe, in place, that look like features of the frame.
+  [[nodiscard]] std::vector<VisualMatch> pairs(const Frame& frame, const Keyframe& keyframe) const;
+  [[nodiscard]] static bool depth_confirms(const Frame& frame, const Keyframe& keyframe,
+                                           const RegistrationResult& found);
+  [[nodiscard]] bool features_support(const Frame& frame, const Keyframe& keyframe,
+                                      const SE3& T_odom_cam) const;
   [[nodiscard]] std::optional<Hypothesis> by_features(const Frame& frame,
                                                       const Keyframe& keyframe) const;
   /// A pose from few features, made better by depth where there is any.

@@ -10,8 +10,12 @@ namespace geoflow::slam {
 /// The paper's components, each of which can be left out (its ablation rows).
 struct Switches {
   bool optical_flow = true;  ///< dual-stream flow (IV-A); off: ORB features matched by projection
-  bool gicp =
-      true;  ///< depth registration in the pose's first guess and in its optimisation (IV-B, IV-C)
+  /// Depth registered to the frame before: in the pose's first guess (IV-B), in its optimisation
+  /// and between consecutive keyframes (IV-C, equation (5)).
+  bool gicp = true;
+  /// Depth registered to the map: surfels of keyframes that see the same surfaces (IV-C, equation
+  /// (6)).
+  bool depth_to_map = true;
 };
 
 /// Grid-spread ORB features (III-1).
@@ -37,7 +41,7 @@ struct PoseConfig {
   double pixel_sigma = 1.0;         ///< least standard deviation of a tracked feature [px]
   int minimum_visual_inliers = 15;  ///< fewer do not count as a visual fix
   double pnp_threshold_px = 3.0;    ///< RANSAC inlier distance [px]
-  int gicp_targets = 3;             ///< keyframes that a frame's depth is registered to at once
+  int map_targets = 3;              ///< keyframes that a frame's depth is registered to at once
   int gicp_surfels = 1200;          ///< of a frame's depth, chosen for a well-conditioned pose
   int iterations = 5;               ///< Gauss-Newton steps at most
 };
@@ -51,9 +55,9 @@ struct KeyframeConfig {
 
 /// Local bundle adjustment (IV-C, figure 4).
 struct MappingConfig {
-  int window = 10;          ///< keyframes that move
-  int fixed = 10;           ///< further keyframes that see the same points or surfaces, held
-  int gicp_neighbours = 4;  ///< keyframes that a new one's depth is registered to
+  int window = 10;         ///< keyframes that move
+  int fixed = 10;          ///< further keyframes that see the same points or surfaces, held
+  int map_neighbours = 4;  ///< keyframes that a new one's depth is registered to
   int iterations = 8;
   double depth_sigma_at_1m = 0.003;  ///< of a feature's depth, growing with z^2 [m]
 };
