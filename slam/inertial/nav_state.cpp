@@ -11,10 +11,9 @@ Vector6d ImuBias::vector() const {
 }
 
 NavState NavState::plus(const StateVector& delta) const {
-  return {T_odom_imu * SE3::exp(delta.head<kVelocityAt>()),
-          v_odom + delta.segment<3>(kVelocityAt),
-          {bias.gyro_radps + delta.segment<3>(kGyroBiasAt),
-           bias.accel_mps2 + delta.segment<3>(kAccelBiasAt)}};
+  return {.T_odom_imu = T_odom_imu * SE3::exp(delta.head<kVelocityAt>()),
+          .v_odom = v_odom + delta.segment<3>(kVelocityAt),
+          .bias = ImuBias::from(bias.vector() + delta.tail<kBiasSize>())};
 }
 
 StateVector NavState::minus(const NavState& other) const {

@@ -1,9 +1,11 @@
 #include "inertial/preintegration.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <ratio>
 #include <span>
 #include <vector>
 
@@ -79,8 +81,8 @@ Vector3d unseen_variance(const Vector3d& change, double noise_sigma, double wand
 
 class Integrator {
  public:
-  Integrator(const ImuBias& bias, const ImuNoise& noise)
-      : noise_{noise}, period_s_{1 / noise.rate_hz} {
+  Integrator(const ImuBias& bias, const ImuNoise& noise, double period_s)
+      : noise_{noise}, period_s_{period_s} {
     result_.bias = bias;
   }
 
@@ -168,6 +170,20 @@ class Integrator {
   Preintegrated result_;
 };
 
+/// The sensor's period, or the median one of the samples where they come more slowly than it says.
+double period_of(std::span<const InertialSample> samples, const ImuNoise& noise) {
+  std::vector<Duration> periods;
+  for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
+    periods.push_back(samples[i + 1].t - samples[i].t);
+  }
+  if (periods.empty()) {
+    return 1 / noise.rate_hz;
+  }
+  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+  std::nth_element(periods.begin(), middle, periods.end());
+  return std::max(1 / noise.rate_hz, to_seconds(*middle));
+}
+
 /// The step from `a` to `b`, cut to [t_begin, t_end].
 Step cut(const InertialSample& a, const InertialSample& b, HostTime t_begin, HostTime t_end) {
   Step step{.first = a, .last = b, .dt_s = 0, .gap_s = to_seconds(b.t - a.t), .held = false};
@@ -215,16 +231,18 @@ std::vector<Step> steps_over(std::span<const InertialSample> samples, HostTime t
 std::vector<InertialSample> unscreened(std::span<const Timed<ImuSample>> samples) {
   std::vector<InertialSample> result;
   result.reserve(samples.size());
-  std::transform(
-      samples.begin(), samples.end(), std::back_inserter(result),
-      [](const Timed<ImuSample>& timed) { return InertialSample{timed.t, timed.sample}; });
+  std::transform(samples.begin(), samples.end(), std::back_inserter(result),
+                 [](const Timed<ImuSample>& timed) {
+                   return InertialSample{.t = timed.t, .sample = timed.sample};
+                 });
   return result;
 }
 
 Preintegrated::Increments Preintegrated::at(const ImuBias& other) const {
   const Eigen::Matrix<double, kMotionSize, 1> change = by_bias * (other.vector() - bias.vector());
-  return {R_imu0_imu1 * so3::exp(change.segment<3>(kRotationAt)),
-          dp + change.segment<3>(kTranslationAt), dv + change.segment<3>(kVelocityAt)};
+  return {.R_imu0_imu1 = R_imu0_imu1 * so3::exp(change.segment<3>(kRotationAt)),
+          .dp = dp + change.segment<3>(kTranslationAt),
+          .dv = dv + change.segment<3>(kVelocityAt)};
 }
 
 Result<Preintegrated> preintegrate(std::span<const InertialSample> samples, HostTime t_begin,
@@ -244,7 +262,7 @@ Result<Preintegrated> preintegrate(std::span<const InertialSample> samples, Host
     return fail(ErrorCode::kUnavailable, "{:.0f} ms without an IMU sample, at most {:.0f} bridged",
                 longest_gap_s * std::milli::den, to_seconds(kLongestGap) * std::milli::den);
   }
-  Integrator integrator{bias, noise};
+  Integrator integrator{bias, noise, period_of(samples, noise)};
   for (const Step& step : steps) {
     integrator.add(step);
   }
