@@ -21,6 +21,9 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/tools/bench/processes.hpp"
 #include "geoflow/tools/interrupt.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+
+#include "bench/suite/simulated.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -58,6 +61,9 @@ struct TableCommand::Job {
   std::vector<Sequence> sequences;
   std::vector<Run> runs;
   fs::path output;
+  fs::path program{};
+  /// By the sequence's index: the command that makes its recording; empty where it is there.
+  std::vector<std::vector<std::string>> make{};
 };
 
 std::string_view TableCommand::examples() {
@@ -69,6 +75,8 @@ std::string_view TableCommand::examples() {
          "      the same commands through GNU parallel, or line N in task N of a Slurm array\n"
          "  geoflow bench table --suite tum --data ~/tum --collect\n"
          "      the table of what they left\n"
+         "  geoflow bench table --suite sim --data ~/sim --seeds 1-5 --scenes office,corridor\n"
+         "      simulated places, made where they are missing\n"
          "What makes a sequence, and what the columns mean: docs/benchmarks.md.";
 }
 
@@ -88,6 +96,15 @@ void TableCommand::declare(CLI::App& command) {
           "--set", settings_,
           "Overrides one key of the configuration in every run, section.key=value; repeatable")
       ->allow_extra_args(false);
+  command.add_option("--seeds", seeds_,
+                     "sim: these seeds of every scene, as 1-5,8; recordings that are missing are "
+                     "made (default: what is there)");
+  command.add_option("--scenes", scenes_, "sim: only these scenes, by commas (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command.add_option("--duration", duration_s_, "sim: length of the recordings that are made [s]")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
   command.add_option("--jobs", jobs_, "Sequences at a time (default: the number of processors)")
       ->check(CLI::Range(std::size_t{1}, kMostJobs).description(""));
   command
@@ -133,18 +150,104 @@ Result<TableCommand::Job> TableCommand::make_job() const {
     return tl::unexpected{std::move(rows.error())};
   }
   job.rows = *std::move(rows);
-  auto sequences = find_sequences(job.suite, data_);
-  if (!sequences) {
-    return tl::unexpected{std::move(sequences.error())};
-  }
-  job.sequences = *std::move(sequences);
   auto program = own_program();
   if (!program) {
     return tl::unexpected{std::move(program.error())};
   }
+  job.program = *std::move(program);
+  if (auto found = find(job); !found) {
+    return tl::unexpected{std::move(found.error())};
+  }
   job.runs = plan_runs(job.sequences, job.rows.available,
-                       {.program = *program, .output = job.output, .settings = settings_});
+                       {.program = job.program, .output = job.output, .settings = settings_});
   return job;
+}
+
+Result<void> TableCommand::find(Job& job) const {
+  const bool simulated = !seeds_.empty() || !scenes_.empty();
+  if (simulated && job.suite != Suite::kSim) {
+    return fail(ErrorCode::kInvalidArgument, "--seeds and --scenes are for the suite sim");
+  }
+  if (simulated) {
+    return plan_simulated(job);
+  }
+  return find_sequences(job.suite, data_).map([&](std::vector<Sequence> sequences) {
+    job.make.resize(sequences.size());
+    job.sequences = std::move(sequences);
+  });
+}
+
+Result<void> TableCommand::plan_simulated(Job& job) const {
+  auto seeds = parse_seeds(seeds_.empty() ? "1" : seeds_);
+  if (!seeds) {
+    return tl::unexpected{std::move(seeds.error())};
+  }
+  std::vector<std::string> scenes = scenes_;
+  if (scenes.empty()) {
+    for (const simulator::SceneInfo& scene : simulator::scenes()) {
+      scenes.emplace_back(scene.name);
+    }
+  }
+  for (SimulatedSequence& one : plan_recordings({.program = job.program,
+                                                 .data = data_,
+                                                 .scenes = std::move(scenes),
+                                                 .seeds = *std::move(seeds),
+                                                 .duration_s = duration_s_})) {
+    std::error_code error;
+    const bool there = fs::exists(one.sequence.reference, error);
+    job.sequences.push_back(std::move(one.sequence));
+    job.make.push_back(there ? std::vector<std::string>{} : std::move(one.make));
+  }
+  return {};
+}
+
+std::size_t TableCommand::at_a_time() const {
+  return jobs_ > 0 ? jobs_ : static_cast<std::size_t>(this_machine().cores);
+}
+
+/// Makes the recordings that are not there; false when interrupted.
+Result<bool> TableCommand::record_missing(const Job& job, Console& console) const {
+  std::vector<Command> commands;
+  for (const auto& make : job.make) {
+    if (!make.empty()) {
+      commands.push_back({.arguments = make});
+    }
+  }
+  const InterruptScope interrupt;
+  const auto ended = run_processes(commands, at_a_time(), [&](std::size_t count) {
+    console.progress(count, commands.size(), "recordings");
+    return !InterruptScope::requested();
+  });
+  console.end_progress();
+  if (!ended || InterruptScope::requested()) {
+    return ended.map([](const auto& /*all*/) { return false; });
+  }
+  for (std::size_t i = 0; i < ended->size(); ++i) {
+    if (!(*ended)[i].well()) {
+      return fail(ErrorCode::kSystem, "{}: {}; its message is above",
+                  shell_line(commands[i].arguments), (*ended)[i].how());
+    }
+  }
+  return true;
+}
+
+/// One line for each task that needs no other: a run, or a recording and all its runs.
+void TableCommand::list(const Job& job, Console& console) const {
+  const std::size_t rows = job.rows.available.size();
+  for (std::size_t i = 0; i < job.sequences.size(); ++i) {
+    std::string line = job.make[i].empty() ? "" : shell_line(job.make[i]);
+    for (std::size_t k = i * rows; k < (i + 1) * rows; ++k) {
+      line += fmt::format("{}{}", line.empty() ? "" : " && ", shell_line(job.runs[k].arguments));
+      if (job.make[i].empty()) {
+        console.line("{}", line);
+        console.object({{"sequence", job.sequences[i].name}, {"command", std::exchange(line, "")}});
+      }
+    }
+    if (!line.empty()) {
+      console.line("{}", line);
+      console.object({{"sequence", job.sequences[i].name}, {"command", line}});
+    }
+  }
 }
 
 /// False when interrupted.
@@ -161,8 +264,7 @@ Result<bool> TableCommand::run_all(const Job& job, Console& console) const {
     commands.push_back(*std::move(command));
   }
   const InterruptScope interrupt;
-  const std::size_t at_a_time = jobs_ > 0 ? jobs_ : static_cast<std::size_t>(this_machine().cores);
-  const auto ended = run_processes(commands, at_a_time, [&](std::size_t count) {
+  const auto ended = run_processes(commands, at_a_time(), [&](std::size_t count) {
     console.progress(count, commands.size(), "runs");
     return !InterruptScope::requested();
   });
@@ -224,15 +326,13 @@ Result<ExitCode> TableCommand::run(Console& console) const {
     return tl::unexpected{job.error()};
   }
   if (list_) {
-    for (const Run& run : job->runs) {
-      console.line("{}", shell_line(run.arguments));
-      console.object(
-          {{"sequence", run.sequence->name}, {"row", run.row->name}, {"command", run.arguments}});
-    }
+    list(*job, console);
     return ExitCode::kOk;
   }
   if (!collect_) {
-    const auto finished = run_all(*job, console);
+    const auto finished = record_missing(*job, console).and_then([&](bool recorded) {
+      return recorded ? run_all(*job, console) : Result<bool>{false};
+    });
     if (!finished) {
       return tl::unexpected{finished.error()};
     }

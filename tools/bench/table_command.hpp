@@ -31,6 +31,11 @@ class TableCommand {
 
   [[nodiscard]] Result<AblationRows> chosen_rows() const;
   [[nodiscard]] Result<Job> make_job() const;
+  [[nodiscard]] Result<void> find(Job& job) const;
+  [[nodiscard]] Result<void> plan_simulated(Job& job) const;
+  [[nodiscard]] Result<bool> record_missing(const Job& job, Console& console) const;
+  void list(const Job& job, Console& console) const;
+  [[nodiscard]] std::size_t at_a_time() const;
   [[nodiscard]] Result<bool> run_all(const Job& job, Console& console) const;
   [[nodiscard]] std::vector<Outcome> judge_all(const Job& job) const;
   [[nodiscard]] Result<void> publish(const Job& job, const std::vector<Outcome>& outcomes,
@@ -41,6 +46,9 @@ class TableCommand {
   std::string output_;
   std::vector<std::string> rows_;
   std::vector<std::string> settings_;
+  std::string seeds_;
+  std::vector<std::string> scenes_;
+  double duration_s_ = 60;
   std::size_t jobs_ = 0;
   double correct_within_m_ = JudgeOptions{}.correct_within_m;
   bool list_ = false;

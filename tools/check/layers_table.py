@@ -36,7 +36,7 @@ LIBRARIES = (
     Library("expected", r"tl/", ("tl::expected",), EVERYWHERE),
     Library("fmt", r"fmt/", ("fmt::fmt",), EVERYWHERE),
     Library("OpenCV", r"opencv2/", ("opencv_core", "opencv_imgproc", "opencv_imgcodecs", "opencv_video", "opencv_calib3d",
-                                    "opencv_features2d"), ("drivers/replay", "slam/vision")),
+                                    "opencv_features2d"), ("drivers/replay", "slam/vision", "tools/simulator/recording")),
     Library("Ceres", r"ceres/", ("Ceres::ceres",), ("slam/optimisation", "tools/calibrate")),
     Library("TBB", r"(oneapi/)?tbb/", ("TBB::tbb",), ("slam", "tools/bench", "tools/simulator/camera")),
     Library("Embree", r"embree3/", ("embree",), ("tools/simulator/camera",)),
