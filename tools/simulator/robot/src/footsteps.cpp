@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/random_stream.hpp"
@@ -32,18 +32,29 @@ constexpr double kReferenceHz = 2;
 /// the odd lines of a slight limp, roll and yaw) they are nearer to its. Bob peaks upwards just
 /// after a pair of feet lands (phases 0 and 1/2), as in both.
 constexpr std::array kLines{
-    Line{BodyAxis::kBob, 1, 0.6e-3, 0.05},   Line{BodyAxis::kBob, 2, 3.0e-3, 0.05},
-    Line{BodyAxis::kBob, 4, 0.85e-3, 0.05},  Line{BodyAxis::kBob, 6, 0.24e-3, 0.05},
-    Line{BodyAxis::kSurge, 1, 2.0e-3, 0.3},  Line{BodyAxis::kSurge, 2, 1.8e-3, 0.15},
-    Line{BodyAxis::kSurge, 4, 0.3e-3, 0.1},  Line{BodyAxis::kSurge, 6, 0.08e-3, 0.1},
-    Line{BodyAxis::kSway, 1, 6.0e-3, 0.05},  Line{BodyAxis::kSway, 3, 0.3e-3, 0.05},
-    Line{BodyAxis::kSway, 5, 0.05e-3, 0.05}, Line{BodyAxis::kRoll, 1, 6.0e-3, 0.3},
-    Line{BodyAxis::kRoll, 2, 5.5e-3, 0.1},   Line{BodyAxis::kRoll, 3, 4.5e-3, 0.2},
-    Line{BodyAxis::kRoll, 5, 2.2e-3, 0.1},   Line{BodyAxis::kRoll, 7, 1.3e-3, 0.03},
-    Line{BodyAxis::kPitch, 1, 4.0e-3, 0.15}, Line{BodyAxis::kPitch, 2, 7.0e-3, 0.2},
-    Line{BodyAxis::kPitch, 4, 2.0e-3, 0.1},  Line{BodyAxis::kPitch, 6, 0.8e-3, 0.05},
-    Line{BodyAxis::kYaw, 1, 18e-3, 0.2},     Line{BodyAxis::kYaw, 3, 2.5e-3, 0.1},
-    Line{BodyAxis::kYaw, 5, 0.6e-3, 0.05}};
+    Line{.axis = BodyAxis::kBob, .harmonic = 1, .amplitude = 0.6e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kBob, .harmonic = 2, .amplitude = 3.0e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kBob, .harmonic = 4, .amplitude = 0.85e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kBob, .harmonic = 6, .amplitude = 0.24e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kSurge, .harmonic = 1, .amplitude = 2.0e-3, .peak_phase = 0.3},
+    Line{.axis = BodyAxis::kSurge, .harmonic = 2, .amplitude = 1.8e-3, .peak_phase = 0.15},
+    Line{.axis = BodyAxis::kSurge, .harmonic = 4, .amplitude = 0.3e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kSurge, .harmonic = 6, .amplitude = 0.08e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kSway, .harmonic = 1, .amplitude = 6.0e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kSway, .harmonic = 3, .amplitude = 0.3e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kSway, .harmonic = 5, .amplitude = 0.05e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kRoll, .harmonic = 1, .amplitude = 6.0e-3, .peak_phase = 0.3},
+    Line{.axis = BodyAxis::kRoll, .harmonic = 2, .amplitude = 5.5e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kRoll, .harmonic = 3, .amplitude = 4.5e-3, .peak_phase = 0.2},
+    Line{.axis = BodyAxis::kRoll, .harmonic = 5, .amplitude = 2.2e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kRoll, .harmonic = 7, .amplitude = 1.3e-3, .peak_phase = 0.03},
+    Line{.axis = BodyAxis::kPitch, .harmonic = 1, .amplitude = 4.0e-3, .peak_phase = 0.15},
+    Line{.axis = BodyAxis::kPitch, .harmonic = 2, .amplitude = 7.0e-3, .peak_phase = 0.2},
+    Line{.axis = BodyAxis::kPitch, .harmonic = 4, .amplitude = 2.0e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kPitch, .harmonic = 6, .amplitude = 0.8e-3, .peak_phase = 0.05},
+    Line{.axis = BodyAxis::kYaw, .harmonic = 1, .amplitude = 18e-3, .peak_phase = 0.2},
+    Line{.axis = BodyAxis::kYaw, .harmonic = 3, .amplitude = 2.5e-3, .peak_phase = 0.1},
+    Line{.axis = BodyAxis::kYaw, .harmonic = 5, .amplitude = 0.6e-3, .peak_phase = 0.05}};
 
 struct Wander {
   BodyAxis axis;
@@ -51,9 +62,11 @@ struct Wander {
 };
 
 /// Of the same Go1's motion capture: height 4 to 8 mm, roll and pitch 0.9 to 1.6 degrees over 6 s.
-constexpr std::array kWanders{Wander{BodyAxis::kSway, 8e-3}, Wander{BodyAxis::kBob, 4e-3},
-                              Wander{BodyAxis::kRoll, 12e-3}, Wander{BodyAxis::kPitch, 16e-3},
-                              Wander{BodyAxis::kYaw, 20e-3}};
+constexpr std::array kWanders{Wander{.axis = BodyAxis::kSway, .amplitude = 8e-3},
+                              Wander{.axis = BodyAxis::kBob, .amplitude = 4e-3},
+                              Wander{.axis = BodyAxis::kRoll, .amplitude = 12e-3},
+                              Wander{.axis = BodyAxis::kPitch, .amplitude = 16e-3},
+                              Wander{.axis = BodyAxis::kYaw, .amplitude = 20e-3}};
 
 /// Slower than a step.
 constexpr double kWanderSpacingS = 0.8;

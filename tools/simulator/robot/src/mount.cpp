@@ -6,7 +6,7 @@
 
 namespace geoflow::simulator {
 
-// NOLINTBEGIN(readability-magic-numbers): the sources are named in the header
+// NOLINTBEGIN(readability-magic-numbers,readability-identifier-naming): as the header says
 
 SE3 go2_T_base_cam() {
   constexpr double kPitchDown = 5 * std::numbers::pi / 180;
@@ -31,6 +31,6 @@ SE3 d435i_T_cam_imu() {
   return (T_imu_depth * d435i_T_depth_cam()).inverse();
 }
 
-// NOLINTEND(readability-magic-numbers)
+// NOLINTEND(readability-magic-numbers,readability-identifier-naming)
 
 }  // namespace geoflow::simulator

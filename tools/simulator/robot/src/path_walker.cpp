@@ -132,7 +132,7 @@ class Walker {
     for (const Round::Corner& corner : round_.corners_ahead(distance_m_, braking_m)) {
       const double there = corner_speed(corner.turn_rad);
       const double braked = std::sqrt(there * there + kAccelMps2 * corner.ahead_m);
-      speed = std::min(speed, std::max(braked, std::max(there, kCreepMps)));
+      speed = std::min(speed, std::max({braked, there, kCreepMps}));
     }
     return speed;
   }
@@ -187,7 +187,8 @@ Round::Round(std::span<const Vector2d> waypoints) {
 }
 
 std::size_t Round::segment_of(double distance_m) const {
-  const auto next = std::ranges::upper_bound(starts_m_, distance_m);
+  const auto next = std::ranges::partition_point(
+      starts_m_, [&](double start_m) { return start_m <= distance_m; });
   return static_cast<std::size_t>(next - starts_m_.begin()) - 1;
 }
 

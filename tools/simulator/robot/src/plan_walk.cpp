@@ -1,19 +1,17 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/knob.hpp"
 #include "geoflow/tools/simulator/random_stream.hpp"
 #include "geoflow/tools/simulator/smooth_signal.hpp"
 #include "geoflow/tools/simulator/walk.hpp"
@@ -42,7 +40,7 @@ std::vector<GaitInterval> gait_intervals(const std::vector<bool>& moving, double
     if (!moving[i]) {
       continue;
     }
-    const double reach = static_cast<double>(kSmoothSignalReach);
+    const auto reach = static_cast<double>(kSmoothSignalReach);
     const double start_s = (static_cast<double>(i) - reach) * kControlSpacingS;
     const double end_s =
         std::min((static_cast<double>(i) + reach) * kControlSpacingS, duration_s + kLastSwingS);
@@ -106,7 +104,9 @@ Result<void> check_arguments(std::span<const Vector2d> waypoints, const WalkOpti
 
 /// A stance integrates what it rolls, and so knows that it is reached; swings are looked at here.
 Result<void> check_reach(const Walk& walk) {
-  for (double t_s = 0; t_s < walk.duration_s(); t_s += kReachCheckS) {
+  const auto count = static_cast<std::size_t>(walk.duration_s() / kReachCheckS);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double t_s = static_cast<double>(i) * kReachCheckS;
     const RobotState state = walk.state(t_s);
     for (const Leg leg : kAllLegs) {
       const Vector3d& centre = state.feet.at(static_cast<std::size_t>(leg)).p_world;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -34,10 +35,10 @@ constexpr double kNoiseDeviation = 0.6297;
 
 Jet polynomial(const std::array<double, kPieceCount>& coefficients, double u) noexcept {
   Jet sum;
-  for (auto c = coefficients.rbegin(); c != coefficients.rend(); ++c) {
+  for (const double coefficient : std::views::reverse(coefficients)) {
     sum.accel = sum.accel * u + 2 * sum.rate;
     sum.rate = sum.rate * u + sum.value;
-    sum.value = sum.value * u + *c;
+    sum.value = sum.value * u + coefficient;
   }
   return sum;
 }
@@ -102,7 +103,7 @@ SmoothSignal SmoothSignal::affine(double scale, double offset) const {
 }
 
 SmoothWeights::SmoothWeights(double t_s, double spacing_s) noexcept
-    : t_s_{t_s}, spacing_s_{spacing_s}, first_{0}, weights_{} {
+    : t_s_{t_s}, spacing_s_{spacing_s} {
   const double start = std::floor(t_s / spacing_s);
   first_ = static_cast<std::int64_t>(start) - 2;
   for (std::size_t piece = 0; piece < kOrder; ++piece) {

@@ -11,6 +11,7 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/smooth_signal.hpp"
+#include "geoflow/tools/simulator/walk_options.hpp"
 
 #include "src/stance_motion.hpp"
 
@@ -130,7 +131,8 @@ RobotState Walk::state(double t_s) const {
   for (const Leg leg : kAllLegs) {
     const auto l = static_cast<std::size_t>(leg);
     const std::vector<Stance>& stances = stances_.at(l);
-    const auto after = std::ranges::upper_bound(stances, t_s, {}, &Stance::touchdown_s);
+    const auto after = std::ranges::partition_point(
+        stances, [&](const Stance& stance) { return stance.touchdown_s <= t_s; });
     const Stance& stance = after == stances.begin() ? *after : *std::prev(after);
     PlacedLeg placed;
     if (t_s < stance.liftoff_s || after == stances.end()) {

@@ -6,6 +6,8 @@
 /// on a Go2; recordings of the simulator carry these as their calibration.
 namespace geoflow::simulator {
 
+// NOLINTBEGIN(readability-identifier-naming): transforms keep their frames' names
+
 /// A D435i on a bracket over the Go2's own front camera (0.327, 0, 0.043 in base, by its URDF):
 /// colour camera at (0.33, 0.0325, 0.06) and looking 5 degrees downwards. The colour lens
 /// stands 32.5 mm to the left of the housing's middle, which is on the robot's middle line.
@@ -19,5 +21,7 @@ namespace geoflow::simulator {
 /// librealsense uses for every D435i without an own calibration, (-5.52, 5.1, 11.74) mm without
 /// rotation.
 [[nodiscard]] SE3 d435i_T_cam_imu();
+
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace geoflow::simulator

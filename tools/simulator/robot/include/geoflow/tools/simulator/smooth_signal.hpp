@@ -36,8 +36,9 @@ class SmoothWeights {
 
   double t_s_;
   double spacing_s_;
-  std::int64_t first_;  ///< the control that the first weight is for; may lie outside the controls
-  std::array<Jet, kOrder> weights_;
+  std::int64_t first_ =
+      0;  ///< the control that the first weight is for; may lie outside the controls
+  std::array<Jet, kOrder> weights_{};
 };
 
 /// A function of time with four continuous derivatives: the uniform quintic B-spline of control

@@ -87,8 +87,8 @@ class Walk {
  private:
   friend Result<Walk> plan_walk(std::span<const Vector2d> waypoints_world,
                                 const WalkOptions& options);
-  Walk(BodyTrajectory body, WalkOptions options)
-      : body_{std::move(body)}, options_{std::move(options)} {}
+  Walk(BodyTrajectory body, const WalkOptions& options)
+      : body_{std::move(body)}, options_{options} {}
 
   BodyTrajectory body_;
   WalkOptions options_;
