@@ -19,6 +19,7 @@
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/toml_text.hpp"
 
 #include "config/keys.hpp"
 
@@ -156,6 +157,9 @@ class Reader {
 };
 
 Result<toml::table> parse(std::string_view text, std::string_view name) {
+  if (auto checked = check_toml_text(name, text); !checked) {
+    return tl::unexpected{std::move(checked.error())};
+  }
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {

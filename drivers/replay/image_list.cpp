@@ -148,8 +148,8 @@ Result<void> prepare_images(const std::filesystem::path& directory,
     return fail(ErrorCode::kInvalidData, "{}: its lists name no image", directory.string());
   }
   auto checked = check_files(directory, images);
-  std::ranges::stable_sort(images, [](const ListedImage& a, const ListedImage& b) {
-    return std::tie(a.t, a.stream) < std::tie(b.t, b.stream);
+  std::ranges::sort(images, [](const ListedImage& a, const ListedImage& b) {
+    return std::tie(a.t, a.stream, a.list, a.line) < std::tie(b.t, b.stream, b.list, b.line);
   });
   return checked;
 }

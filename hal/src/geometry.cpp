@@ -14,9 +14,16 @@ constexpr double kSmallAngle = 1e-4;
 Matrix3d left_jacobian_mixed_block(const Vector3d& phi, const Vector3d& rho) noexcept {
   const double angle = phi.norm();
   const double angle2 = angle * angle;
-  double a = 1.0 / 6 - angle2 / 120;
-  double b = 1.0 / 24 - angle2 / 720;
-  double c = 1.0 / 120 - angle2 / 2520;
+  // The Taylor series of a, b and c.
+  constexpr double kA0 = 1.0 / 6;
+  constexpr double kA2 = 1.0 / 120;
+  constexpr double kB0 = 1.0 / 24;
+  constexpr double kB2 = 1.0 / 720;
+  constexpr double kC0 = 1.0 / 120;
+  constexpr double kC2 = 1.0 / 2520;
+  double a = kA0 - angle2 * kA2;
+  double b = kB0 - angle2 * kB2;
+  double c = kC0 - angle2 * kC2;
   constexpr double kSeriesAngle = 1e-2;  // the closed form of c divides by angle^5
   if (angle > kSeriesAngle) {
     const double sine = std::sin(angle);
@@ -74,7 +81,8 @@ Matrix3d right_jacobian_inverse(const Vector3d& phi) noexcept {
   const double angle = phi.norm();
   const Matrix3d W = skew(phi);
   if (angle < kSmallAngle) {
-    return Matrix3d::Identity() + 0.5 * W + W * W / 12;
+    constexpr double kSecondOrder = 1.0 / 12;
+    return Matrix3d::Identity() + 0.5 * W + kSecondOrder * W * W;
   }
   const double half_cot = 0.5 * std::cos(angle / 2) / std::sin(angle / 2);
   return Matrix3d::Identity() + 0.5 * W + (1 - angle * half_cot) / (angle * angle) * W * W;

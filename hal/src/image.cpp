@@ -1,5 +1,6 @@
 #include "geoflow/hal/image.hpp"
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <vector>

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 namespace geoflow::log {
 namespace {
 

@@ -4,6 +4,8 @@
 #include <string_view>
 #include <system_error>
 
+#include <tl/expected.hpp>
+
 namespace geoflow {
 
 tl::unexpected<Error> fail_errno(std::string_view what) {

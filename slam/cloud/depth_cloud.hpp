@@ -15,6 +15,7 @@
 
 namespace geoflow::slam {
 
+// NOLINTBEGIN(readability-magic-numbers): each number is the value of a member that names it
 /// How a depth image becomes surfels.
 struct DepthCloudConfig {
   int cell_px = 8;            ///< side of a cell [px]
@@ -35,6 +36,7 @@ struct DepthCloudConfig {
   double max_plane_rms = 3.0;
   double max_incidence_deg = 78.0;  ///< a steeper view of the surface is rejected
 };
+// NOLINTEND(readability-magic-numbers)
 
 /// One small piece of surface in the camera frame [m]. Its covariance is plane-shaped, as in
 /// generalised ICP: normal_variance along the normal, tangent_variance() along the other two

@@ -29,6 +29,7 @@
 /// same bits with any number of TBB threads.
 namespace geoflow::slam {
 
+// NOLINTBEGIN(readability-magic-numbers): each number is the value of a member that names it
 /// One level of coarse-to-fine association.
 struct GicpStage {
   double max_distance_m = 0.1;  ///< a pair of surfels further apart is no pair
@@ -69,6 +70,7 @@ struct GicpConfig {
   /// A direction is open when the pairs constrain it worse than this [m] (rotations: at 1 m).
   double max_sigma_m = 0.02;
 };
+// NOLINTEND(readability-magic-numbers)
 
 /// A Gauss-Newton system H xi = -b at a pose, b the gradient of cost.
 struct NormalEquations {

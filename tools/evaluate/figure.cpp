@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -36,7 +37,8 @@ std::array<int, 3> axes_by_extent(const PosePairs& pairs) {
   }
   const Vector3d extent = high - low;
   std::array<int, 3> order{0, 1, 2};
-  std::ranges::stable_sort(order, [&](int a, int b) { return extent[a] > extent[b]; });
+  std::ranges::sort(order,
+                    [&](int a, int b) { return std::tie(extent[b], a) < std::tie(extent[a], b); });
   return order;
 }
 

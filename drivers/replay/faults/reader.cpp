@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <random>
@@ -27,11 +29,14 @@ namespace {
 
 class FaultReader final : public RecordingReader {
  public:
-  FaultReader(std::unique_ptr<RecordingReader> inner, std::vector<Fault> faults, std::uint64_t seed)
+  FaultReader(std::unique_ptr<RecordingReader> inner, const std::vector<Fault>& faults,
+              std::uint64_t seed)
       : inner_{std::move(inner)}, stamps_{inner_->stamps()} {
-    std::ranges::stable_partition(
-        faults, [](const Fault& fault) { return fault.kind != FaultKind::kClockWrap; });
-    for (const Fault& fault : faults) {
+    const auto wraps = [](const Fault& fault) { return fault.kind == FaultKind::kClockWrap; };
+    std::vector<Fault> ordered;
+    std::ranges::copy_if(faults, std::back_inserter(ordered), std::not_fn(wraps));
+    std::ranges::copy_if(faults, std::back_inserter(ordered), wraps);
+    for (const Fault& fault : ordered) {
       // Each fault draws from a sequence of its own: a change of one leaves the others as they
       // were.
       std::seed_seq sequence{seed, seed >> 32U, std::uint64_t{stages_.size()}};

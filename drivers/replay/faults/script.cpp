@@ -2,7 +2,6 @@
 
 #include <array>
 #include <bitset>
-#include <cctype>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -20,6 +19,7 @@
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/toml_text.hpp"
 
 #include "replay/text.hpp"
 
@@ -266,43 +266,6 @@ Result<std::vector<Fault>> read_array(std::string_view file, const toml::array& 
   return faults;
 }
 
-bool may_begin_key(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '"' ||
-         c == '\'' || c == ']';
-}
-
-/// Guards toml++ 3.3, which asserts where it should check: that a key follows the brackets of a
-/// table's header, and that letters outside of strings are ASCII. Scripts have no arrays, so that
-/// every bracket outside of comments must be such a header's.
-Result<void> check_text(std::string_view file, std::string_view content) {
-  std::size_t line = 1;
-  bool in_comment = false;
-  for (std::size_t i = 0; i < content.size(); ++i) {
-    const char c = content[i];
-    if (c == '\n' || c == '\r') {
-      line += c == '\n' ? 1U : 0U;
-      in_comment = false;
-      continue;
-    }
-    if (c != '\t' && (c < ' ' || c > '~')) {
-      return fail(ErrorCode::kInvalidArgument, "{}:{}: not TOML: only ASCII text is expected", file,
-                  line);
-    }
-    in_comment = in_comment || c == '#';
-    if (in_comment || c != '[') {
-      continue;
-    }
-    i += content.substr(i).starts_with("[[") ? 1U : 0U;
-    const std::size_t key = content.find_first_not_of(" \t", i + 1);
-    if (key != std::string_view::npos && !may_begin_key(content[key])) {
-      return fail(ErrorCode::kInvalidArgument,
-                  "{}:{}: not TOML: the name of a table is expected behind the bracket", file,
-                  line);
-    }
-  }
-  return {};
-}
-
 Result<std::vector<Fault>> read_top(std::string_view file, const toml::table& top) {
   Result<std::vector<Fault>> faults;
   for (const auto& [key, node] : top) {
@@ -324,7 +287,7 @@ Result<std::vector<Fault>> read_top(std::string_view file, const toml::table& to
 }  // namespace
 
 Result<std::vector<Fault>> parse_script(std::string_view file, std::string_view content) {
-  if (auto checked = check_text(file, content); !checked) {
+  if (auto checked = check_toml_text(file, content); !checked) {
     return tl::unexpected{std::move(checked.error())};
   }
   try {

@@ -18,6 +18,7 @@ struct Switches {
   bool depth_to_map = true;
 };
 
+// NOLINTBEGIN(readability-magic-numbers): each number is the value of a member that names it
 /// Grid-spread ORB features (III-1).
 struct FeatureConfig {
   int cell_px = 40;            ///< side of a grid cell [px]
@@ -61,6 +62,7 @@ struct MappingConfig {
   int iterations = 8;
   double depth_sigma_at_1m = 0.003;  ///< of a feature's depth, growing with z^2 [m]
 };
+// NOLINTEND(readability-magic-numbers)
 
 struct Config {
   Switches switches;
