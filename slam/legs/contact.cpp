@@ -33,8 +33,8 @@ constexpr double kForceStep = 0.1;
 constexpr double kSupportStep = 0.06;
 /// Speeds of a foot along and across the ground (x, y, z): while it stands, creeping, rolling and
 /// giving way, and while it swings [m/s].
-const Vector3d kStanceSpeed{0.1, 0.1, 0.05};
-const Vector3d kSwingSpeed{0.7, 0.7, 0.7};
+constexpr std::array kStanceSpeed{0.1, 0.1, 0.05};
+constexpr std::array kSwingSpeed{0.7, 0.7, 0.7};
 /// Height over the lowest foot that a standing foot rarely has on even ground, the change that
 /// makes a difference, and how little that says [m, log-odds].
 constexpr double kLowHeight = 0.02;
@@ -52,8 +52,9 @@ double bounded(double log_odds) {
 
 /// log N(v; 0, S + stance^2) - log N(v; 0, S + swing^2), bounded.
 double kinematic_log_odds(const Vector3d& v, const Matrix3d& covariance) {
-  const auto log_density = [&](const Vector3d& speed) {
-    const Matrix3d S = covariance + Matrix3d{speed.cwiseAbs2().asDiagonal()};
+  const auto log_density = [&](const std::array<double, 3>& speed) {
+    const Vector3d sigma{speed[0], speed[1], speed[2]};
+    const Matrix3d S = covariance + Matrix3d{sigma.cwiseAbs2().asDiagonal()};
     return -0.5 * (v.dot(S.inverse() * v) + std::log(S.determinant()));
   };
   return std::clamp(log_density(kStanceSpeed) - log_density(kSwingSpeed), -kMovingBound, kBound);
@@ -116,7 +117,8 @@ const ContactEstimator::Feet& ContactEstimator::update(
   update_weight(evidence, dt_s);
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
     FootState& foot = feet_.at(leg);
-    if (!evidence.at(leg)) {
+    const std::optional<FootEvidence>& seen = evidence.at(leg);
+    if (!seen) {
       const double unheard_s = foot.unheard_s + dt_s;
       foot = unheard_s > kUnheard ? FootState{} : foot;
       foot.unheard_s = unheard_s;
@@ -124,10 +126,10 @@ const ContactEstimator::Feet& ContactEstimator::update(
       continue;
     }
     foot.unheard_s = 0;
-    if (evidence.at(leg)->force) {
-      ranges_.at(leg).update(*evidence.at(leg)->force, dt_s);
+    if (seen->force) {
+      ranges_.at(leg).update(*seen->force, dt_s);
     }
-    foot.probability = 1 / (1 + std::exp(-log_odds(leg, *evidence.at(leg))));
+    foot.probability = 1 / (1 + std::exp(-log_odds(leg, *seen)));
     const bool stood = foot.stands;
     foot.stands = foot.probability > (stood ? kLift : kTouch);
     foot.stance_s = foot.stands && stood ? foot.stance_s + dt_s : 0;

@@ -26,11 +26,11 @@ int foothold_block(Leg leg) {
 
 void ContactFilter::reset(const LeggedState& state, const Covariance& covariance) {
   state_ = state;
-  P_ = covariance;
+  covariance_ = covariance;
 }
 
 void ContactFilter::widen_velocity(double sigma_mps) {
-  P_.diagonal().segment<3>(kVelocity).array() += sigma_mps * sigma_mps;
+  covariance_.diagonal().segment<3>(kVelocity).array() += sigma_mps * sigma_mps;
 }
 
 void ContactFilter::propagate(const ImuSample& mean, double dt_s, const StepNoise& noise) {
@@ -63,15 +63,15 @@ void ContactFilter::propagate(const ImuSample& mean, double dt_s, const StepNois
     return P + D.leftCols<kDrivers>() * P.topRows<kDrivers>() +
            D.middleCols<kDrivers>(kGyroBias) * P.middleRows<kDrivers>(kGyroBias);
   };
-  P_ = driven(driven(P_).transpose());
+  covariance_ = driven(driven(covariance_).transpose());
 
   // The gyroscope's noise enters wherever its bias does; the accelerometer's as its bias.
-  const Eigen::Matrix<double, kErrorSize, 3> G_gyro = D.middleCols<3>(kGyroBias);
-  const Eigen::Matrix<double, kErrorSize, 3> G_accel = D.middleCols<3>(kAccelBias);
-  P_ += G_gyro * (noise.gyro * noise.gyro / dt_s) * G_gyro.transpose();
-  P_ += G_accel * (noise.accel * noise.accel / dt_s) * G_accel.transpose();
+  const Eigen::Matrix<double, kErrorSize, 3> by_gyro = D.middleCols<3>(kGyroBias);
+  const Eigen::Matrix<double, kErrorSize, 3> by_accel = D.middleCols<3>(kAccelBias);
+  covariance_ += by_gyro * (noise.gyro * noise.gyro / dt_s) * by_gyro.transpose();
+  covariance_ += by_accel * (noise.accel * noise.accel / dt_s) * by_accel.transpose();
   const auto add = [&](int block, const Vector3d& density) {
-    P_.diagonal().segment<3>(block) += density.cwiseAbs2() * dt_s;
+    covariance_.diagonal().segment<3>(block) += density.cwiseAbs2() * dt_s;
   };
   add(kGyroBias, Vector3d::Constant(noise.gyro_walk));
   add(kAccelBias, Vector3d::Constant(noise.accel_walk));
@@ -88,9 +88,9 @@ void ContactFilter::touch_down(Leg leg, const Vector3d& foot_in_imu, const Matri
   const Matrix3d R = state_.q_odom_imu.toRotationMatrix();
   state_.footholds.at(static_cast<std::size_t>(leg)) = state_.p_odom + R * foot_in_imu;
   const int block = foothold_block(leg);
-  P_.middleRows<3>(block) = P_.middleRows<3>(kPosition).eval();
-  P_.middleCols<3>(block) = P_.middleCols<3>(kPosition).eval();
-  P_.block<3, 3>(block, block) += R * covariance * R.transpose();
+  covariance_.middleRows<3>(block) = covariance_.middleRows<3>(kPosition).eval();
+  covariance_.middleCols<3>(block) = covariance_.middleCols<3>(kPosition).eval();
+  covariance_.block<3, 3>(block, block) += R * covariance * R.transpose();
 }
 
 void ContactFilter::roll(Leg leg, const Vector3d& displacement) {
@@ -125,18 +125,18 @@ double ContactFilter::update_gyro_bias(const Vector3d& gyro_radps, const Matrix3
 
 double ContactFilter::correct(const Gain& H, const Vector3d& innovation, const Matrix3d& noise,
                               double gate) {
-  const Eigen::Matrix<double, kErrorSize, 3> PHt = P_ * H.transpose();
-  const Matrix3d S = H * PHt + noise;
-  const Matrix3d S_inverse = S.inverse();
-  const double nis = innovation.dot(S_inverse * innovation);
+  const Eigen::Matrix<double, kErrorSize, 3> covariance_z = covariance_ * H.transpose();
+  const Matrix3d S = H * covariance_z + noise;
+  const Matrix3d information = S.inverse();
+  const double nis = innovation.dot(information * innovation);
   // Written so that NaN is refused as well.
   if (!(nis <= gate)) {
     return nis;
   }
-  const Eigen::Matrix<double, kErrorSize, 3> K = PHt * S_inverse;
+  const Eigen::Matrix<double, kErrorSize, 3> K = covariance_z * information;
   const Eigen::Matrix<double, kErrorSize, 1> delta = K * innovation;
-  P_ -= K * PHt.transpose();
-  P_ = (0.5 * (P_ + P_.transpose())).eval();
+  covariance_ -= K * covariance_z.transpose();
+  covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 
   const Vector3d phi = delta.segment<3>(kAttitude);
   const Eigen::Quaterniond rotation = so3::exp(phi);
@@ -158,18 +158,19 @@ double ContactFilter::correct(const Gain& H, const Vector3d& innovation, const M
 
 Matrix6d ContactFilter::pose_covariance() const {
   // phi = R^T delta_R, rho = R^T (delta_p - p x delta_R): see the error's definition.
-  const Matrix3d Rt = state_.q_odom_imu.toRotationMatrix().transpose();
-  Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
-  J.block<3, 3>(0, kAttitude) = Rt;
-  J.block<3, 3>(3, kAttitude) = -Rt * skew(state_.p_odom);
-  J.block<3, 3>(3, kPosition) = Rt;
-  return J * P_.topLeftCorner<9, 9>() * J.transpose();
+  const Matrix3d R_imu_odom = state_.q_odom_imu.toRotationMatrix().transpose();
+  using ToPose = Eigen::Matrix<double, 6, kGyroBias>;
+  ToPose J = ToPose::Zero();
+  J.block<3, 3>(0, kAttitude) = R_imu_odom;
+  J.block<3, 3>(3, kAttitude) = -R_imu_odom * skew(state_.p_odom);
+  J.block<3, 3>(3, kPosition) = R_imu_odom;
+  return J * covariance_.topLeftCorner<kGyroBias, kGyroBias>() * J.transpose();
 }
 
 Matrix3d ContactFilter::velocity_covariance() const {
   Eigen::Matrix<double, 3, 6> J;
   J << -skew(state_.v_odom), Matrix3d::Identity();
-  return J * P_.topLeftCorner<6, 6>() * J.transpose();
+  return J * covariance_.topLeftCorner<6, 6>() * J.transpose();
 }
 
 }  // namespace geoflow::slam

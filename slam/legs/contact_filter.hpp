@@ -76,7 +76,7 @@ class ContactFilter {
 
   [[nodiscard]] const LeggedState& state() const noexcept { return state_; }
   /// Of the error described above.
-  [[nodiscard]] const Covariance& covariance() const noexcept { return P_; }
+  [[nodiscard]] const Covariance& covariance() const noexcept { return covariance_; }
 
   /// Covariance of the pose T_odom_imu as hal/geometry.hpp defines it.
   [[nodiscard]] Matrix6d pose_covariance() const;
@@ -88,7 +88,7 @@ class ContactFilter {
   double correct(const Gain& H, const Vector3d& innovation, const Matrix3d& noise, double gate);
 
   LeggedState state_;
-  Covariance P_ = Covariance::Zero();
+  Covariance covariance_ = Covariance::Zero();
 };
 
 }  // namespace geoflow::slam

@@ -53,6 +53,8 @@ struct LegConfig {
   SE3 T_base_imu;
   LegNoise noise;
   ImuNoise imu_noise;
+  /// Error of a robot's own odometry twist, which lasts for LegNoise::speed_memory_s [m/s].
+  double twist_mps = 0.05;
   /// What a walking body's shocks and the mounting's vibration add to the accelerometer's noise
   /// density [m/s^2/sqrt(Hz)]. Source: Cerberus trusts it with 0.9 m/s^2 at 400 Hz.
   double shock_density = 0.045;

@@ -5,15 +5,16 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include <Eigen/Core>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/leg_kinematics.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
@@ -23,20 +24,21 @@
 #include "legs/contact_filter.hpp"
 #include "legs/foot_motion.hpp"
 #include "legs/leg_config.hpp"
+#include "legs/leg_preintegration.hpp"
 #include "legs/stance_velocity.hpp"
+#include "legs/standing.hpp"
 
 namespace geoflow::slam {
 namespace {
 
-/// A robot that does not stand still within this is taken as moving.
-constexpr Duration kPatience = std::chrono::seconds{2};
-/// Then: a tilt by an acceleration of 1 m/s^2 over a second, and a trot's speed.
-constexpr double kMovingTilt = 0.1;   // [rad]
-constexpr double kMovingSpeed = 1.0;  // [m/s]
 /// Of a normalised innovation squared with 3 degrees of freedom: 99.9 %.
 constexpr double kGate = 16.3;
 /// How long a foot that is seen to move goes on moving [s]: with its speed it says how far.
 constexpr double kDragMemory = 0.02;
+/// Without leg samples for this long, a twist takes their place.
+constexpr Duration kLegsSilent = std::chrono::milliseconds{100};
+/// Steps below this are rounding [s].
+constexpr double kLeastStep = 1e-4;
 /// Zero velocity is measured this often, not at each sample: its error is the robot's sway.
 constexpr Duration kRestInterval = std::chrono::milliseconds{100};
 constexpr double kRestSpeed = 3e-3;  // [m/s]
@@ -53,6 +55,17 @@ bool same_joints(const LegSample& a, const LegSample& b) {
   });
 }
 
+template <typename Sample>
+void push_newer(std::span<const Timed<Sample>> samples, std::optional<HostTime>& t_newest,
+                std::deque<Timed<Sample>>& pending) {
+  for (const Timed<Sample>& sample : samples) {
+    if (!t_newest || sample.t > *t_newest) {
+      t_newest = sample.t;
+      pending.push_back(sample);
+    }
+  }
+}
+
 }  // namespace
 
 LegOdometry::LegOdometry(const LegConfig& config, const BiasPrior& bias)
@@ -61,67 +74,16 @@ LegOdometry::LegOdometry(const LegConfig& config, const BiasPrior& bias)
       prior_{bias},
       initialiser_{config.imu_noise, bias, T_imu_base_.rotation() * Vector3d::UnitX()},
       stillness_{config.imu_noise},
-      stance_estimator_{config.noise} {
+      stance_estimator_{config.noise},
+      preintegrator_{config} {
   step_noise_.gyro = config.imu_noise.gyro_noise_density;
   step_noise_.accel = std::hypot(config.imu_noise.accel_noise_density, config.shock_density);
   step_noise_.gyro_walk = config.imu_noise.gyro_random_walk;
   step_noise_.accel_walk = config.imu_noise.accel_random_walk;
 }
 
-void LegOdometry::start(const StandingFix& fix) {
-  const SE3 T_odom_imu = SE3{fix.R_odom_imu, Vector3d::Zero()};
-  LeggedState state;
-  state.q_odom_imu = fix.R_odom_imu;
-  // base begins in odom's origin.
-  state.p_odom = -(T_odom_imu * T_imu_base_.translation());
-  state.bias_gyro = fix.bias.gyro_radps;
-  state.bias_accel = fix.bias.accel_mps2;
-  const Matrix3d R = fix.R_odom_imu.toRotationMatrix();
-  Eigen::Matrix<double, ContactFilter::kErrorSize, 9> J =
-      Eigen::Matrix<double, ContactFilter::kErrorSize, 9>::Zero();
-  J.block<3, 3>(ContactFilter::kAttitude, 0) = R;
-  // The origin is base's place, exactly: a tilt moves the IMU about it, which in this error is
-  // delta_p = p x delta_R - p x delta_R = 0.
-  J.block<6, 6>(ContactFilter::kGyroBias, 3).setIdentity();
-  ContactFilter::Covariance P = J * fix.covariance * J.transpose();
-  P.block<3, 3>(ContactFilter::kVelocity, ContactFilter::kVelocity) =
-      square(kRestSpeed) * Matrix3d::Identity();
-  filter_.reset(state, P);
-  t_ = fix.t;
-  started_ = true;
-  contact_ = {};
-  R_odom_calf_ = {};
-  last_legs_.reset();
-}
-
-void LegOdometry::try_start(HostTime t) {
-  if (const Result<StandingFix> fix = initialiser_.fix()) {
-    start(*fix);
-  } else if (!imu_.empty() && t - *t_first_ >= kPatience) {
-    Vector3d sum = Vector3d::Zero();
-    const HostTime t_end = std::min(t, imu_.newest());
-    for (HostTime s = t_end - kPatience / 2; s < t_end; s = imu_.next_knot(s, t_end)) {
-      sum += imu_.at(s).accel_mps2;
-    }
-    StandingFix guess;
-    guess.t = t_end;
-    guess.R_odom_imu = level_rotation(sum.normalized(), T_imu_base_.rotation() * Vector3d::UnitX());
-    guess.bias = prior_.bias;
-    const Matrix3d Rt = guess.R_odom_imu.toRotationMatrix().transpose();
-    guess.covariance.topLeftCorner<3, 3>() =
-        square(kMovingTilt) * (Matrix3d::Identity() - Rt.col(2) * Rt.col(2).transpose());
-    guess.covariance.bottomRightCorner<6, 6>() = prior_.covariance;
-    start(guess);
-    filter_.widen_velocity(kMovingSpeed);
-  }
-  if (started_) {
-    std::erase_if(pending_, [&](const Timed<LegSample>& legs) { return legs.t <= t_; });
-  }
-}
-
-std::optional<LegEstimate> LegOdometry::add(std::span<const Timed<ImuSample>> imu,
-                                            std::span<const Timed<LegSample>> legs, HostTime t) {
-  for (const Timed<ImuSample>& sample : imu) {
+void LegOdometry::queue(const MotionSamples& samples) {
+  for (const Timed<ImuSample>& sample : samples.imu) {
     if (imu_.empty() || sample.t > imu_.newest()) {
       t_first_ = t_first_.value_or(sample.t);
       imu_.add(sample);
@@ -130,12 +92,12 @@ std::optional<LegEstimate> LegOdometry::add(std::span<const Timed<ImuSample>> im
       }
     }
   }
-  for (const Timed<LegSample>& sample : legs) {
-    if (!t_newest_legs_ || sample.t > *t_newest_legs_) {
-      t_newest_legs_ = sample.t;
-      pending_.push_back(sample);
-    }
-  }
+  push_newer(samples.legs, t_newest_legs_, pending_);
+  push_newer(samples.body_velocity, t_newest_twist_, pending_twists_);
+}
+
+std::optional<LegEstimate> LegOdometry::add(const MotionSamples& samples, HostTime t) {
+  queue(samples);
   if (!started_) {
     try_start(t);
   }
@@ -143,9 +105,18 @@ std::optional<LegEstimate> LegOdometry::add(std::span<const Timed<ImuSample>> im
     return std::nullopt;
   }
   health_ = {};
-  while (!pending_.empty() && pending_.front().t <= t) {
-    take(pending_.front());
-    pending_.pop_front();
+  const auto due = [&](const auto& samples_of) {
+    return !samples_of.empty() && samples_of.front().t <= t;
+  };
+  while (due(pending_) || due(pending_twists_)) {
+    if (!due(pending_twists_) ||
+        (due(pending_) && pending_.front().t <= pending_twists_.front().t)) {
+      take(pending_.front());
+      pending_.pop_front();
+    } else {
+      take(pending_twists_.front());
+      pending_twists_.pop_front();
+    }
   }
   advance(t);
   imu_.forget_before(t);
@@ -158,15 +129,21 @@ void LegOdometry::advance(HostTime t) {
     const double dt = to_seconds(t_next - t_);
     const ImuSample a = imu_.at(t_);
     const ImuSample b = imu_.at(t_next);
-    filter_.propagate({.accel_mps2 = 0.5 * (a.accel_mps2 + b.accel_mps2),
-                       .gyro_radps = 0.5 * (a.gyro_radps + b.gyro_radps)},
-                      dt, step_noise_);
+    const ImuSample mean{.accel_mps2 = 0.5 * (a.accel_mps2 + b.accel_mps2),
+                         .gyro_radps = 0.5 * (a.gyro_radps + b.gyro_radps)};
+    leg_step_.dt_s = dt;
+    leg_step_.gyro_radps = mean.gyro_radps;
+    if (!leg_step_.contact) {
+      leg_step_.velocity = base_velocity(turn_at(t_));
+    }
+    preintegrator_.add(leg_step_);
+    filter_.propagate(mean, dt, step_noise_);
     stillness_.add(t_next, b);
     t_ = t_next;
   }
 }
 
-Matrix3d LegOdometry::R_odom_base() const {
+Matrix3d LegOdometry::odom_base_rotation() const {
   return (filter_.state().q_odom_imu * T_imu_base_.rotation()).toRotationMatrix();
 }
 
@@ -175,11 +152,11 @@ BaseTurn LegOdometry::turn_at(HostTime t) const {
   const ImuNoise& noise = config_.imu_noise;
   return {.w_base_radps = R_base_imu * (imu_.at(t).gyro_radps - filter_.state().bias_gyro),
           .sigma_radps = noise.gyro_noise_density * std::sqrt(noise.rate_hz),
-          .up_base = R_odom_base().transpose().col(2)};
+          .up_base = odom_base_rotation().transpose().col(2)};
 }
 
 VelocityBelief LegOdometry::base_velocity(const BaseTurn& turn) const {
-  const Matrix3d R_base_odom = R_odom_base().transpose();
+  const Matrix3d R_base_odom = odom_base_rotation().transpose();
   const Vector3d p_base_imu = config_.T_base_imu.translation();
   const Matrix3d by_turn = turn.sigma_radps * skew(p_base_imu);
   return {.v_base_mps = R_base_odom * filter_.state().v_odom - turn.w_base_radps.cross(p_base_imu),
@@ -205,7 +182,7 @@ std::array<std::optional<FootEvidence>, kLegCount> LegOdometry::evidence(const L
                     return joint.tau_nm != 0;
                   });
   const VelocityBelief body = base_velocity(turn);
-  const Matrix3d R = R_odom_base();
+  const Matrix3d R = odom_base_rotation();
   double lowest = std::numeric_limits<double>::infinity();
   for (const std::optional<FootMotion>& motion : motions) {
     lowest = motion ? std::min(lowest, turn.up_base.dot(motion->contact.point)) : lowest;
@@ -215,7 +192,7 @@ std::array<std::optional<FootEvidence>, kLegCount> LegOdometry::evidence(const L
     if (!motions.at(leg)) {
       continue;
     }
-    const FootMotion& motion = *motions.at(leg);
+    const FootMotion& motion = motions.at(leg).value();
     FootEvidence& foot = evidence.at(leg).emplace();
     foot.force = static_cast<double>(legs.foot_force.at(leg));
     foot.height_m = turn.up_base.dot(motion.contact.point) - lowest;
@@ -251,10 +228,7 @@ void LegOdometry::take(const Timed<LegSample>& legs) {
   const FootMotions found = motions(legs.sample, turn);
   const auto seen = evidence(legs.sample, found, turn);
   contact_.update(seen, dt);
-  stance_ = stance_estimator_.update(found, contact_.feet(), base_velocity(turn));
-  if (stance_.legs > 0) {
-    health_.contact_s += dt;
-  }
+  use_stance(found, turn, dt);
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
     double drag = 0;
     if (seen.at(leg)) {
@@ -271,12 +245,49 @@ void LegOdometry::take(const Timed<LegSample>& legs) {
   rest(legs.t);
 }
 
+void LegOdometry::use_stance(const FootMotions& motions, const BaseTurn& turn, double dt_s) {
+  stance_ = stance_estimator_.update(motions, contact_.feet(), base_velocity(turn));
+  leg_step_.contact = stance_.legs > 0;
+  if (leg_step_.contact) {
+    health_.contact_s += dt_s;
+    leg_step_.velocity = stance_.velocity;
+    leg_step_.velocity_by_turn = stance_.by_turn;
+    leg_step_.sample_s = dt_s;
+  } else {
+    leg_step_.velocity_by_turn.setZero();
+    leg_step_.sample_s = 0;
+  }
+}
+
+void LegOdometry::take(const Timed<BodyVelocitySample>& twist) {
+  const bool legs_speak = last_legs_ && twist.t - last_legs_->t < kLegsSilent;
+  if (legs_speak || twist.t < t_ || !twist.sample.v_base_mps.allFinite()) {
+    return;
+  }
+  advance(twist.t);
+  const double period = t_last_twist_ ? to_seconds(twist.t - *t_last_twist_) : 0.0;
+  t_last_twist_ = twist.t;
+  const BaseTurn turn = turn_at(twist.t);
+  const Vector3d v_base =
+      twist.sample.v_base_mps + turn.w_base_radps.cross(config_.T_base_imu.translation());
+  // The error lasts: in that time it may be used as one measurement.
+  const double repeats = std::max(1.0, config_.noise.speed_memory_s / std::max(period, kLeastStep));
+  count(filter_.update_velocity(T_imu_base_.rotation() * v_base,
+                                square(config_.twist_mps) * repeats * Matrix3d::Identity(), kGate));
+  leg_step_.contact = true;
+  leg_step_.velocity = {.v_base_mps = twist.sample.v_base_mps,
+                        .covariance = square(config_.twist_mps) * Matrix3d::Identity()};
+  leg_step_.velocity_by_turn.setZero();
+  leg_step_.sample_s = period;
+  rest(twist.t);
+}
+
 void LegOdometry::update_feet(const FootMotions& motions) {
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
     if (!contact_.feet().at(leg).stands) {
       R_odom_calf_.at(leg).reset();
-    } else if (motions.at(leg)) {
-      update_foot(static_cast<Leg>(leg), *motions.at(leg));
+    } else if (const std::optional<FootMotion>& motion = motions.at(leg)) {
+      update_foot(static_cast<Leg>(leg), *motion);
     }
   }
 }
@@ -286,7 +297,7 @@ void LegOdometry::update_foot(Leg leg, const FootMotion& motion) {
   const Vector3d foot_in_imu = T_imu_base_ * motion.centre;
   const Matrix3d covariance = R_imu_base * motion.centre_covariance * R_imu_base.transpose();
   std::optional<Matrix3d>& R_odom_calf = R_odom_calf_.at(static_cast<std::size_t>(leg));
-  const Matrix3d R_now = R_odom_base() * motion.R_base_calf;
+  const Matrix3d R_now = odom_base_rotation() * motion.R_base_calf;
   bool known = R_odom_calf.has_value();
   if (known) {
     const double radius = config_.rolling * config_.geometry.foot_radius_m;
@@ -299,7 +310,7 @@ void LegOdometry::update_foot(Leg leg, const FootMotion& motion) {
   if (!known) {
     filter_.touch_down(leg, foot_in_imu, covariance);
   }
-  R_odom_calf = R_odom_base() * motion.R_base_calf;
+  R_odom_calf = odom_base_rotation() * motion.R_base_calf;
 }
 
 void LegOdometry::count(double nis) {
@@ -334,8 +345,8 @@ LegEstimate LegOdometry::estimate(HostTime t) {
   LegEstimate estimate;
   estimate.t = t;
   estimate.T_odom_base = SE3{state.q_odom_imu, state.p_odom} * T_imu_base_;
-  const Matrix6d Ad = config_.T_base_imu.adjoint();
-  estimate.covariance = Ad * filter_.pose_covariance() * Ad.transpose();
+  const Matrix6d adjoint = config_.T_base_imu.adjoint();
+  estimate.covariance = adjoint * filter_.pose_covariance() * adjoint.transpose();
   const Vector3d way = config_.noise.scale * (estimate.T_odom_base.rotation().conjugate() *
                                               estimate.T_odom_base.translation());
   estimate.covariance.bottomRightCorner<3, 3>() += way * way.transpose();
@@ -345,6 +356,8 @@ LegEstimate LegOdometry::estimate(HostTime t) {
   estimate.stance = stance_;
   estimate.still = still_;
   estimate.health = health_;
+  estimate.increment = preintegrator_.increment(t);
+  preintegrator_.begin(t, state.bias_gyro);
   return estimate;
 }
 

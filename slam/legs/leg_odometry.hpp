@@ -17,6 +17,7 @@
 #include "legs/foot_motion.hpp"
 #include "legs/imu_track.hpp"
 #include "legs/leg_config.hpp"
+#include "legs/leg_preintegration.hpp"
 #include "legs/stance_velocity.hpp"
 #include "legs/standing.hpp"
 
@@ -32,6 +33,13 @@ struct LegHealth {
   double contact_s = 0;          ///< time with at least one standing foot [s]
 };
 
+/// What a packet brings of the robot's motion; parts may be empty.
+struct MotionSamples {
+  std::span<const Timed<ImuSample>> imu;
+  std::span<const Timed<LegSample>> legs;
+  std::span<const Timed<BodyVelocitySample>> body_velocity;
+};
+
 /// Where legs and IMU alone think the robot is.
 struct LegEstimate {
   HostTime t;
@@ -43,6 +51,8 @@ struct LegEstimate {
   ContactEstimator::Feet feet{};
   StanceVelocity stance;  ///< at the newest leg sample
   bool still = false;
+  /// The factor from the time of the previous estimate (or of the start) to this one.
+  LegIncrement increment;
   LegHealth health;
 };
 
@@ -52,7 +62,8 @@ struct LegEstimate {
 /// moving is started after `kPatience` from the mean specific force, with the uncertainty that this
 /// deserves. Between leg samples the contact filter integrates the IMU; at each it decides which
 /// feet stand, and their places correct it. A foot whose place contradicts the prediction starts a
-/// new foothold. Deterministic; thread-compatible.
+/// new foothold. Where no legs are heard, a robot's own odometry twist takes their place.
+/// Deterministic; thread-compatible.
 class LegOdometry {
  public:
   explicit LegOdometry(const LegConfig& config, const BiasPrior& bias = BiasPrior::cold());
@@ -60,8 +71,7 @@ class LegOdometry {
   /// Takes samples, in order of time; those known already (packets overlap) are ignored. Moves on
   /// to `t`, using samples up to it and interpolating the IMU with the one behind; later ones are
   /// kept for the next call. None as long as it is not started.
-  std::optional<LegEstimate> add(std::span<const Timed<ImuSample>> imu,
-                                 std::span<const Timed<LegSample>> legs, HostTime t);
+  std::optional<LegEstimate> add(const MotionSamples& samples, HostTime t);
 
   /// Starts from a known state at `fix.t`, whatever it was before.
   void start(const StandingFix& fix);
@@ -73,19 +83,22 @@ class LegOdometry {
   /// since.
   using CalfRotations = std::array<std::optional<Matrix3d>, kLegCount>;
 
+  void queue(const MotionSamples& samples);
   void try_start(HostTime t);
   void advance(HostTime t);
   void take(const Timed<LegSample>& legs);
+  void take(const Timed<BodyVelocitySample>& twist);
   [[nodiscard]] FootMotions motions(const LegSample& legs, const BaseTurn& turn) const;
   [[nodiscard]] std::array<std::optional<FootEvidence>, kLegCount> evidence(
       const LegSample& legs, const FootMotions& motions, const BaseTurn& turn);
+  void use_stance(const FootMotions& motions, const BaseTurn& turn, double dt_s);
   void update_feet(const FootMotions& motions);
   void update_foot(Leg leg, const FootMotion& motion);
   void rest(HostTime t);
   void count(double nis);
   [[nodiscard]] BaseTurn turn_at(HostTime t) const;
   [[nodiscard]] VelocityBelief base_velocity(const BaseTurn& turn) const;
-  [[nodiscard]] Matrix3d R_odom_base() const;
+  [[nodiscard]] Matrix3d odom_base_rotation() const;
   [[nodiscard]] LegEstimate estimate(HostTime t);
 
   LegConfig config_;
@@ -98,18 +111,23 @@ class LegOdometry {
   ContactFilter filter_;
   ImuTrack imu_;
   std::deque<Timed<LegSample>> pending_;
+  std::deque<Timed<BodyVelocitySample>> pending_twists_;
+  LegPreintegrator preintegrator_;
 
   bool started_ = false;
   std::optional<HostTime> t_first_;
   HostTime t_;
   std::optional<Timed<LegSample>> last_legs_;
   std::optional<HostTime> t_newest_legs_;
+  std::optional<HostTime> t_newest_twist_;
+  std::optional<HostTime> t_last_twist_;
   std::optional<HostTime> t_rest_;
   CalfRotations R_odom_calf_;
   ContactFilter::StepNoise step_noise_;
   bool torques_seen_ = false;
   bool still_ = false;
   StanceVelocity stance_;
+  LegStep leg_step_;  ///< velocity of the newest sample, held until the next
   LegHealth health_;
 };
 

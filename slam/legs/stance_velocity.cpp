@@ -34,19 +34,25 @@ StanceVelocityEstimator::Votes StanceVelocityEstimator::votes(
     const FootMotions& motions, const ContactEstimator::Feet& feet) const {
   Votes votes;
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-    if (!motions.at(leg) || !feet.at(leg).stands) {
-      continue;
+    const std::optional<FootMotion>& motion = motions.at(leg);
+    if (motion && feet.at(leg).stands) {
+      const Matrix3d S = motion->v_covariance +
+                         square(noise_.speed_after(feet.at(leg).stance_s)) * Matrix3d::Identity();
+      votes.at(leg) = {.v = motion->v_base,
+                       .covariance = S,
+                       .information = S.inverse(),
+                       .point = motion->contact.point};
     }
-    const FootMotion& motion = *motions.at(leg);
-    const Matrix3d S = motion.v_covariance +
-                       square(noise_.speed_after(feet.at(leg).stance_s)) * Matrix3d::Identity();
-    votes.at(leg) = {.v = motion.v_base, .covariance = S, .information = S.inverse()};
   }
   return votes;
 }
 
 double StanceVelocityEstimator::disagreement(std::size_t leg, const Votes& votes,
                                              const std::optional<VelocityBelief>& prediction) {
+  const std::optional<Vote>& judged = votes.at(leg);
+  if (!judged) {
+    return 0;
+  }
   Matrix3d information = Matrix3d::Zero();
   Vector3d weighted = Vector3d::Zero();
   int others = 0;
@@ -55,9 +61,10 @@ double StanceVelocityEstimator::disagreement(std::size_t leg, const Votes& votes
     weighted = information * prediction->v_base_mps;
   }
   for (std::size_t other = 0; other < kLegCount; ++other) {
-    if (other != leg && votes.at(other)) {
-      information += votes.at(other)->information;
-      weighted += votes.at(other)->information * votes.at(other)->v;
+    const std::optional<Vote>& vote = votes.at(other);
+    if (other != leg && vote) {
+      information += vote->information;
+      weighted += vote->information * vote->v;
       ++others;
     }
   }
@@ -65,8 +72,8 @@ double StanceVelocityEstimator::disagreement(std::size_t leg, const Votes& votes
     return 0;
   }
   const Matrix3d covariance = information.inverse();
-  const Vector3d difference = votes.at(leg)->v - covariance * weighted;
-  return difference.dot((covariance + votes.at(leg)->covariance).inverse() * difference);
+  const Vector3d difference = judged->v - covariance * weighted;
+  return difference.dot((covariance + judged->covariance).inverse() * difference);
 }
 
 void StanceVelocityEstimator::find_slips(const Votes& votes,
@@ -77,7 +84,7 @@ void StanceVelocityEstimator::find_slips(const Votes& votes,
     double worst = kSlipGate;
     std::optional<std::size_t> worst_leg;
     for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-      const double distance = rest.at(leg) ? disagreement(leg, rest, prediction) : 0.0;
+      const double distance = disagreement(leg, rest, prediction);
       if (distance > worst) {
         worst = distance;
         worst_leg = leg;
@@ -95,15 +102,16 @@ void StanceVelocityEstimator::find_slips(const Votes& votes,
   }
 }
 
-double StanceVelocityEstimator::pair_rate(const FootMotions& motions, const Votes& votes) {
+double StanceVelocityEstimator::pair_rate(const Votes& votes) {
   double largest = 0;
-  for (std::size_t a = 0; a < kLegCount; ++a) {
-    for (std::size_t b = 0; b < a; ++b) {
-      if (votes.at(a) && votes.at(b)) {
-        const Vector3d along =
-            (motions.at(a)->contact.point - motions.at(b)->contact.point).normalized();
-        const Matrix3d covariance = votes.at(a)->covariance + votes.at(b)->covariance;
-        const double rate = along.dot(votes.at(a)->v - votes.at(b)->v);
+  for (std::size_t leg = 0; leg < kLegCount; ++leg) {
+    for (std::size_t other = 0; other < leg; ++other) {
+      const std::optional<Vote>& a = votes.at(leg);
+      const std::optional<Vote>& b = votes.at(other);
+      if (a && b) {
+        const Vector3d along = (a->point - b->point).normalized();
+        const Matrix3d covariance = a->covariance + b->covariance;
+        const double rate = along.dot(a->v - b->v);
         largest = std::max(largest, std::abs(rate) / std::sqrt(along.dot(covariance * along)));
       }
     }
@@ -111,30 +119,35 @@ double StanceVelocityEstimator::pair_rate(const FootMotions& motions, const Vote
   return largest;
 }
 
-VelocityBelief StanceVelocityEstimator::combine(const Votes& votes) {
+void StanceVelocityEstimator::combine(const Votes& votes, StanceVelocity& result) {
   std::array<double, kLegCount> weights{};
   weights.fill(1);
-  VelocityBelief belief;
+  VelocityBelief& belief = result.velocity;
   for (int step = 0; step < kReweightings; ++step) {
     Matrix3d information = Matrix3d::Zero();
+    Matrix3d by_turn = Matrix3d::Zero();
     Vector3d weighted = Vector3d::Zero();
     for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-      if (votes.at(leg)) {
-        information += weights.at(leg) * votes.at(leg)->information;
-        weighted += weights.at(leg) * votes.at(leg)->information * votes.at(leg)->v;
+      const std::optional<Vote>& vote = votes.at(leg);
+      if (vote) {
+        const Matrix3d share = weights.at(leg) * vote->information;
+        information += share;
+        weighted += share * vote->v;
+        by_turn += share * skew(vote->point);
       }
     }
     belief.covariance = information.inverse();
     belief.v_base_mps = belief.covariance * weighted;
+    result.by_turn = belief.covariance * by_turn;
     for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-      if (votes.at(leg)) {
-        const Vector3d off = votes.at(leg)->v - belief.v_base_mps;
-        const double distance = std::sqrt(off.dot(votes.at(leg)->information * off));
+      const std::optional<Vote>& vote = votes.at(leg);
+      if (vote) {
+        const Vector3d off = vote->v - belief.v_base_mps;
+        const double distance = std::sqrt(off.dot(vote->information * off));
         weights.at(leg) = distance > kHuber ? kHuber / distance : 1.0;
       }
     }
   }
-  return belief;
 }
 
 StanceVelocity StanceVelocityEstimator::update(const FootMotions& motions,
@@ -143,21 +156,21 @@ StanceVelocity StanceVelocityEstimator::update(const FootMotions& motions,
   Votes all = votes(motions, feet);
   find_slips(all, prediction);
   StanceVelocity result;
-  result.pair_rate = pair_rate(motions, all);
+  result.pair_rate = pair_rate(all);
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-    if (!all.at(leg)) {
+    std::optional<Vote>& vote = all.at(leg);
+    if (!vote) {
       continue;
     }
     ++result.legs;
     if (disagreements_.at(leg) >= kSlipSamples) {
       result.slips.at(leg) = true;
-      Vote& vote = *all.at(leg);
-      vote.covariance += square(kSlipSpeed) * Matrix3d::Identity();
-      vote.information = vote.covariance.inverse();
+      vote->covariance += square(kSlipSpeed) * Matrix3d::Identity();
+      vote->information = vote->covariance.inverse();
     }
   }
   if (result.legs > 0) {
-    result.velocity = combine(all);
+    combine(all, result);
   }
   return result;
 }

@@ -25,6 +25,7 @@ struct StanceVelocity {
   /// Of this instant's noise, which is independent from sample to sample; what is not is
   /// LegNoise::speed_mps.
   VelocityBelief velocity;
+  Matrix3d by_turn = Matrix3d::Zero();  ///< d velocity / d w_base [m]
   std::uint32_t legs = 0;  ///< that stand and contribute; with none, velocity says nothing
   std::array<bool, kLegCount> slips{};
   /// Largest rate of change of the distance between two standing feet, in standard deviations:
@@ -52,6 +53,7 @@ class StanceVelocityEstimator {
     Vector3d v;
     Matrix3d covariance;
     Matrix3d information;
+    Vector3d point;  ///< of contact, in base
   };
   using Votes = std::array<std::optional<Vote>, kLegCount>;
 
@@ -59,8 +61,8 @@ class StanceVelocityEstimator {
   void find_slips(const Votes& votes, const std::optional<VelocityBelief>& prediction);
   [[nodiscard]] static double disagreement(std::size_t leg, const Votes& votes,
                                            const std::optional<VelocityBelief>& prediction);
-  [[nodiscard]] static double pair_rate(const FootMotions& motions, const Votes& votes);
-  [[nodiscard]] static VelocityBelief combine(const Votes& votes);
+  [[nodiscard]] static double pair_rate(const Votes& votes);
+  static void combine(const Votes& votes, StanceVelocity& result);
 
   LegNoise noise_;
   std::array<int, kLegCount> disagreements_{};  ///< samples in a row

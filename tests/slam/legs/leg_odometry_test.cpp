@@ -58,8 +58,10 @@ std::vector<LegEstimate> run(const LegConfig& config, const WalkRecording& walk,
   };
   HostTime t = walk.imu.front().t;
   for (; t + frame <= walk.imu.back().t; t += frame) {
-    const auto estimate =
-        odometry.add(part(walk.imu, t, t + frame), part(walk.legs, t, t + frame), t + frame);
+    const auto estimate = odometry.add({.imu = part(walk.imu, t, t + frame),
+                                        .legs = part(walk.legs, t, t + frame),
+                                        .body_velocity = part(walk.twists, t, t + frame)},
+                                       t + frame);
     if (estimate) {
       estimates.push_back(*estimate);
     }
@@ -222,9 +224,55 @@ TEST(LegOdometry, SurvivesBrokenSamples) {
   EXPECT_LT(drift_since(walk, estimates, at_seconds(2.5)).share(), 0.1);
 }
 
+/// A robot that gives its own odometry instead of its joints: here the true velocity with the error
+/// that is expected of one.
+TEST(LegOdometry, ARobotsOwnTwistTakesTheLegsPlace) {
+  GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
+  WalkRecording walk = tests::read_go2_trot(folder / kTrots[1]);
+  walk.legs.clear();
+  constexpr std::size_t kEvery = 10;  // 50 Hz, a Go2's sportmodestate
+  for (std::size_t k = kEvery; k + kEvery < walk.truth.size(); k += kEvery) {
+    const SE3 T_before_after = walk.truth[k - 1].sample.inverse() * walk.truth[k + 1].sample;
+    const double dt = to_seconds(walk.truth[k + 1].t - walk.truth[k - 1].t);
+    Timed<BodyVelocitySample>& twist = walk.twists.emplace_back();
+    twist.t = walk.truth[k].t;
+    twist.sample.v_base_mps = T_before_after.translation() / dt;
+  }
+  const std::vector<LegEstimate> estimates = run(go2(), walk);
+  const Drift drift = drift_since(walk, estimates, at_seconds(2.5));
+  record("twist", drift);
+  EXPECT_LT(drift.share(), 0.01);
+  EXPECT_GT(estimates.back().increment.contact, 0.99);
+}
+
+/// The factors between frames, against the truth: consistent, and free of the accelerometer.
+TEST(LegOdometry, IncrementsAreConsistentWithTheirCovariance) {
+  GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
+  for (const std::string& name : kTrots) {
+    const WalkRecording walk = tests::read_go2_trot(folder / name);
+    const std::vector<LegEstimate> estimates = run(go2(), walk, milliseconds{100});
+    double nees = 0;
+    double count = 0;
+    for (const LegEstimate& estimate : estimates) {
+      const LegIncrement& increment = estimate.increment;
+      if (increment.t_begin < at_seconds(3)) {
+        continue;
+      }
+      const LegResidual residual =
+          leg_residual(increment, walk.truth_at(increment.t_begin), walk.truth_at(increment.t_end),
+                       increment.bias_gyro, Vector3d::Zero());
+      nees += residual.value.dot(increment.covariance.inverse() * residual.value) / 3;
+      ++count;
+    }
+    RecordProperty(name + "_nees_per_dof", std::to_string(nees / count));
+    EXPECT_GT(nees / count, 0.2) << name;
+    EXPECT_LT(nees / count, 2) << name;
+  }
+}
+
 TEST(LegOdometry, AnUnheardRobotIsNotStarted) {
   LegOdometry odometry{go2()};
-  EXPECT_FALSE(odometry.add({}, {}, at_seconds(100)));
+  EXPECT_FALSE(odometry.add({}, at_seconds(100)));
   EXPECT_FALSE(odometry.started());
 }
 

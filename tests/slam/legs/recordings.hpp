@@ -14,7 +14,8 @@ namespace geoflow::tests {
 struct WalkRecording {
   std::vector<Timed<ImuSample>> imu;  ///< in base's axes
   std::vector<Timed<LegSample>> legs;
-  std::vector<Timed<SE3>> truth;  ///< T_world_base, z up, at the times of `legs`
+  std::vector<Timed<BodyVelocitySample>> twists;  ///< empty in all recordings read here
+  std::vector<Timed<SE3>> truth;                  ///< T_world_base, z up, at the times of `legs`
   /// Who stands, as the recording says; empty where it does not.
   std::vector<std::array<bool, kLegCount>> contacts;
 
