@@ -199,12 +199,13 @@ class Judge : public testing::Test {
  protected:
   Outcome judge_walk(const Trajectory& estimate, const JudgeOptions& options = {}) {
     EXPECT_TRUE(write_tum(folder_.path() / "final_camera.txt", estimate));
-    std::ofstream{folder_.path() / "report.json"}
-        << R"({"frames": 300, "tracked": 290, "times_ms": {"process": {"mean": 12.5}}})";
+    std::ofstream{folder_.path() / "report.json"} << report_;
     return judge({.name = "s", .recording = {}, .reference = {}}, "r", truth_, folder_.path(),
                  options);
   }
 
+  std::string report_ =
+      R"({"frames": 300, "tracked": 290, "times_ms": {"process": {"mean": 12.5}}})";
   tests::TemporaryDirectory folder_;
   Result<TrajectoryFile> truth_{TrajectoryFile{
       .poses = walk(0), .format = TrajectoryFormat::kTum, .matrices = {}, .warnings = {}}};
@@ -235,6 +236,16 @@ TEST_F(Judge, HalfARunHasFailed) {
   const Outcome outcome = judge_walk(half);
   EXPECT_THAT(outcome.failure, HasSubstr("of the time only"));
   EXPECT_LT(outcome.coverage, 0.5);
+}
+
+TEST_F(Judge, TruthBeforeAndAfterTheRecordingDoesNotCount) {
+  Trajectory half = walk(0);
+  half.resize(100);
+  EXPECT_NE(judge_walk(half).failure, "");
+  report_ = R"({"input": {"start_ns": 0, "end_ns": 3300000000}})";
+  const Outcome outcome = judge_walk(half);
+  EXPECT_EQ(outcome.failure, "");
+  EXPECT_NEAR(outcome.coverage, 1, 0.01);
 }
 
 TEST_F(Judge, PosesFarFromTheTruthDoNotCount) {

@@ -37,17 +37,28 @@ EvaluationOptions evaluation_options(const JudgeOptions& options) {
   return evaluation;
 }
 
-void read_report(const std::filesystem::path& file, Outcome& outcome) {
+nlohmann::json read_report(const std::filesystem::path& file) {
   std::ifstream stream{file};
-  const auto report = nlohmann::json::parse(stream, nullptr, false);
-  const auto number = [&](const nlohmann::json::json_pointer& place) {
-    return report.is_object() && report.contains(place) && report.at(place).is_number()
-               ? report.at(place).get<double>()
-               : kNone;
-  };
-  outcome.frames = number("/frames"_json_pointer);
-  outcome.tracked = number("/tracked"_json_pointer);
-  outcome.frame_ms = number("/times_ms/process/mean"_json_pointer);
+  return nlohmann::json::parse(stream, nullptr, false);
+}
+
+/// The number at a place of a report; not a number where there is none.
+double number(const nlohmann::json& report, const nlohmann::json::json_pointer& place) {
+  return report.is_object() && report.contains(place) && report.at(place).is_number()
+             ? report.at(place).get<double>()
+             : kNone;
+}
+
+/// The truth for the time of the recording: motion capture runs on before and after it.
+TrajectoryFile during(const nlohmann::json& report, TrajectoryFile truth) {
+  const double start_ns = number(report, "/input/start_ns"_json_pointer);
+  const double end_ns = number(report, "/input/end_ns"_json_pointer);
+  std::erase_if(truth.poses, [&](const StampedPose& pose) {
+    const auto t_ns = static_cast<double>(pose.t.time_since_epoch().count());
+    const auto margin_ns = static_cast<double>(kMaxDifference.count());
+    return t_ns < start_ns - margin_ns || t_ns > end_ns + margin_ns;
+  });
+  return truth;
 }
 
 /// The last line of the run's log, for people.
@@ -108,12 +119,15 @@ Outcome judge(const Sequence& sequence, const std::string& row, const Result<Tra
     outcome.failure = last_line(output / "log.txt");
     return outcome;
   }
-  read_report(output / "report.json", outcome);
+  const nlohmann::json report = read_report(output / "report.json");
+  outcome.frames = number(report, "/frames"_json_pointer);
+  outcome.tracked = number(report, "/tracked"_json_pointer);
+  outcome.frame_ms = number(report, "/times_ms/process/mean"_json_pointer);
   const char* const file =
       sequence.frame == ReferenceFrame::kCamera ? "final_camera.txt" : "final_base.txt";
   const auto evaluation = read_trajectory(output / file).and_then([&](const TrajectoryFile& poses) {
     return truth.and_then([&](const TrajectoryFile& reference) {
-      return evaluate(poses, reference, evaluation_options(options));
+      return evaluate(poses, during(report, reference), evaluation_options(options));
     });
   });
   if (!evaluation) {

@@ -33,9 +33,10 @@ struct Outcome {
   double tracked = 0;
 };
 
-/// Judges what `geoflow replay` left in `output` against the sequence's truth. A run that left
-/// nothing, cannot be laid over the truth, or vouches for less than half of the reference's time
-/// with poses within JudgeOptions::correct_within_m has failed. Definitions: docs/evaluate.md.
+/// Judges what `geoflow replay` left in `output` against the sequence's truth during the recording.
+/// A run that left nothing, cannot be laid over the truth, or vouches for less than half of the
+/// reference's time with poses within JudgeOptions::correct_within_m has failed. Definitions:
+/// docs/evaluate.md.
 [[nodiscard]] Outcome judge(const Sequence& sequence, const std::string& row,
                             const Result<TrajectoryFile>& truth,
                             const std::filesystem::path& output, const JudgeOptions& options);
