@@ -5,23 +5,31 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <ios>
 #include <iterator>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/hal/exit_code.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/tools/bench/processes.hpp"
+#include "geoflow/tools/bench/table.hpp"
+#include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/trajectory_file.hpp"
 
 #include "bench/suite/simulated.hpp"
 

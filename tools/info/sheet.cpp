@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/contact_sheet.hpp"

@@ -9,6 +9,7 @@
 #include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"

@@ -1,11 +1,24 @@
 #include "simulate/settings.hpp"
 
+#include <cstddef>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/nearest_name.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/imu_simulator.hpp"
+#include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/leg_simulator.hpp"
+#include "geoflow/tools/simulator/recording_options.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/walk_options.hpp"
 
 namespace geoflow::tools {
 namespace {

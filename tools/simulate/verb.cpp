@@ -14,7 +14,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
@@ -35,7 +35,7 @@
 namespace geoflow::tools {
 namespace {
 
-constexpr double kLongest_s = 7200;
+constexpr double kLongestS = 7200;
 
 constexpr std::string_view kExamples =
     "  geoflow simulate office -o bag --seed 7 --duration 60       a minute's walk through an "
@@ -84,7 +84,7 @@ void SimulateVerb::declare(CLI::App& command) {
   command.add_option("--seed", seed_, "Decides the place, the walk and all noise")
       ->capture_default_str();
   command.add_option("--duration", duration_s_, "Length of the recording [s]")
-      ->check(CLI::Range(0.1, kLongest_s).description(""))
+      ->check(CLI::Range(0.1, kLongestS).description(""))
       ->capture_default_str();
   command.add_option("--preset", presets_, "Several knobs at once, before --set; repeatable")
       ->allow_extra_args(false);

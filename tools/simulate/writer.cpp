@@ -1,18 +1,26 @@
 #include "simulate/writer.hpp"
 
+#include <cstddef>
+#include <filesystem>
 #include <fstream>
+#include <functional>
+#include <ios>
 #include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/bag_writer.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/truth_files.hpp"
 #include "geoflow/tools/simulator/tum_writer.hpp"
 

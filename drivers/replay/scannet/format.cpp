@@ -4,11 +4,21 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <zlib.h>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/result.hpp"
 
 namespace geoflow::drivers::scannet {
 namespace {
@@ -194,11 +204,11 @@ Result<std::vector<std::uint16_t>> decode_depth(const Header& header,
     std::memcpy(depth.data(), bytes.data(), expected);
     return depth;
   }
-  uLongf length = expected;
+  unsigned long length = expected;
   void* const target = depth.data();
   const void* const source = bytes.data();
-  const int status = ::uncompress(static_cast<Bytef*>(target), &length,
-                                  static_cast<const Bytef*>(source), bytes.size());
+  const int status = ::uncompress(static_cast<unsigned char*>(target), &length,
+                                  static_cast<const unsigned char*>(source), bytes.size());
   if (status != Z_OK || length != expected) {
     return fail(ErrorCode::kInvalidData, "a damaged depth image (zlib: {}, {} of {} bytes)", status,
                 length, expected);

@@ -2,7 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 
 namespace geoflow::drivers::scannet {
 namespace {
@@ -51,11 +58,11 @@ std::vector<ColorResampler::Footprint> ColorResampler::footprints(double scale, 
   };
   for (int i = 0; i < count; ++i) {
     const double centre = clamped(scale * i + offset);
-    const double first = clamped(std::floor(centre - half + 0.5));
-    const double last = clamped(std::floor(centre + half + 0.5));
+    const int first = static_cast<int>(clamped(std::floor(centre - half + 0.5)));
+    const int last = static_cast<int>(clamped(std::floor(centre + half + 0.5)));
     Footprint& footprint = all.emplace_back(Footprint{.first = static_cast<std::size_t>(first)});
     double sum = 0;
-    for (double pixel = first; pixel <= last; ++pixel) {
+    for (int pixel = first; pixel <= last; ++pixel) {
       const double covered =
           std::min(pixel + 0.5, centre + half) - std::max(pixel - 0.5, centre - half);
       footprint.weights.push_back(static_cast<float>(std::max(covered, 0.0)));
@@ -86,6 +93,15 @@ void ColorResampler::add_rows(std::span<const std::byte> image, const Footprint&
   }
 }
 
+float ColorResampler::mean_at(const Footprint& columns, const std::vector<float>& row,
+                              std::size_t channel) {
+  float mean = 0;
+  for (std::size_t k = 0; k < columns.weights.size(); ++k) {
+    mean += columns.weights[k] * row[(columns.first + k) * kChannels + channel];
+  }
+  return mean;
+}
+
 std::vector<std::byte> ColorResampler::operator()(std::span<const std::byte> image) const {
   std::vector<std::byte> target;
   target.reserve(rows_.size() * columns_.size() * kChannels);
@@ -94,11 +110,8 @@ std::vector<std::byte> ColorResampler::operator()(std::span<const std::byte> ima
     add_rows(image, rows, mean_row);
     for (const Footprint& columns : columns_) {
       for (std::size_t channel = 0; channel < kChannels; ++channel) {
-        float value = 0.5F;  // rounds
-        for (std::size_t k = 0; k < columns.weights.size(); ++k) {
-          value += columns.weights[k] * mean_row[(columns.first + k) * kChannels + channel];
-        }
-        target.push_back(static_cast<std::byte>(static_cast<int>(value)));
+        const float value = mean_at(columns, mean_row, channel);
+        target.push_back(static_cast<std::byte>(static_cast<int>(value + 0.5F)));
       }
     }
   }
@@ -118,7 +131,8 @@ std::vector<std::uint16_t> register_depth(std::span<const std::uint16_t> depth,
   for (std::size_t i = 0; i < depth.size(); ++i) {
     const double z_m = depth[i] / counts_per_m;
     const auto u = static_cast<double>(i % static_cast<std::size_t>(source.width));
-    const auto v = static_cast<double>(i / static_cast<std::size_t>(source.width));
+    const std::size_t row = i / static_cast<std::size_t>(source.width);
+    const auto v = static_cast<double>(row);
     const double counts = (T_color_depth * point_at(source, u, v, z_m)).z() * counts_per_m;
     const Vector3d upper = T_color_depth * point_at(source, u - 0.5, v - 0.5, z_m);
     const Vector3d lower = T_color_depth * point_at(source, u + 0.5, v + 0.5, z_m);

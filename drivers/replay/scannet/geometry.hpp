@@ -34,6 +34,9 @@ class ColorResampler {
   void add_rows(std::span<const std::byte> image, const Footprint& rows,
                 std::vector<float>& sum) const;
 
+  [[nodiscard]] static float mean_at(const Footprint& columns, const std::vector<float>& row,
+                                     std::size_t channel);
+
   std::size_t source_width_;
   std::vector<Footprint> columns_;
   std::vector<Footprint> rows_;

@@ -1,27 +1,30 @@
 #include "replay/scannet/reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <ios>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -40,9 +43,9 @@ using Path = std::filesystem::path;
 
 constexpr std::string_view kExtension = ".sens";
 /// The Structure sensor's rate, at which all scans were made.
-constexpr double kFrameRate_hz = 30;
+constexpr double kFrameRateHz = 30;
 /// Stamps are microseconds; larger ones would not fit a Duration.
-constexpr std::uint64_t kLatestStamp_us =
+constexpr std::uint64_t kLatestStampUs =
     std::numeric_limits<std::int64_t>::max() / std::int64_t{2000};
 
 /// One frame's place in the file.
@@ -90,8 +93,8 @@ std::vector<Frame> find_frames(std::ifstream& file, const Header& header, std::u
     if (bytes.size() < kFrameHeaderBytes) {
       break;
     }
-    Frame frame{.header = parse_frame_header(std::span{bytes}.first<kFrameHeaderBytes>()),
-                .offset = offset + kFrameHeaderBytes};
+    const Frame frame{.header = parse_frame_header(std::span{bytes}.first<kFrameHeaderBytes>()),
+                      .offset = offset + kFrameHeaderBytes};
     const std::uint64_t left = size - frame.offset;
     if (frame.header.color_bytes > std::min(kLargestImage, left) ||
         frame.header.depth_bytes > std::min(kLargestImage, left - frame.header.color_bytes)) {
@@ -106,7 +109,7 @@ std::vector<Frame> find_frames(std::ifstream& file, const Header& header, std::u
 /// Whether every frame has stamps, each larger than the one before.
 bool stamps_are_times(const std::vector<Frame>& frames) {
   const auto fits = [](std::uint64_t stamp_us) {
-    return stamp_us > 0 && stamp_us < kLatestStamp_us;
+    return stamp_us > 0 && stamp_us < kLatestStampUs;
   };
   const bool all_fit = std::ranges::all_of(frames, [&](const Frame& frame) {
     return fits(frame.header.color_us) && fits(frame.header.depth_us);
@@ -187,7 +190,7 @@ class Reader final : public RecordingReader {
 
   [[nodiscard]] HostTime time_of(std::size_t index, ImageStream stream) const {
     if (!stamped_) {
-      return HostTime{from_seconds(static_cast<double>(index) / kFrameRate_hz)};
+      return HostTime{from_seconds(static_cast<double>(index) / kFrameRateHz)};
     }
     const FrameHeader& header = frames_[index].header;
     const std::uint64_t stamp_us =

@@ -3,18 +3,25 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
 
 // glibc 2.36 declares it without language linkage.

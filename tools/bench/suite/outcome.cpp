@@ -5,17 +5,28 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
+#include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
+#include "geoflow/tools/bench/table.hpp"
 #include "geoflow/tools/evaluate/alignment.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
+#include "geoflow/tools/trajectory_file.hpp"
 
 #include "bench/suite/published.hpp"
 

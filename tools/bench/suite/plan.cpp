@@ -1,6 +1,11 @@
 #include "bench/suite/plan.hpp"
 
+#include <filesystem>
+#include <string>
 #include <system_error>
+#include <vector>
+
+#include "geoflow/hal/result.hpp"
 
 namespace geoflow::tools {
 

@@ -3,10 +3,16 @@
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+
+#include "geoflow/hal/result.hpp"
 
 namespace geoflow::tools {
 namespace {

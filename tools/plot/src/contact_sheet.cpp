@@ -4,8 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <utility>
+#include <vector>
 
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/tools/plot.hpp"
 
 #include "plot/src/canvas.hpp"

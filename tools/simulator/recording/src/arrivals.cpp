@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/simulator/random_stream.hpp"
 
 namespace geoflow::simulator {
 

@@ -1,5 +1,14 @@
 #include "body_odometry.hpp"
 
+#include <cstddef>
+#include <cstdint>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/random_stream.hpp"
+#include "geoflow/tools/simulator/recording_options.hpp"
+
 namespace geoflow::simulator {
 
 BodyOdometry::BodyOdometry(std::uint64_t seed, const RecordingOptions& options)

@@ -1,6 +1,9 @@
 #include "geoflow/tools/simulator/recording_options.hpp"
 
 #include <array>
+#include <span>
+
+#include "geoflow/tools/simulator/knob.hpp"
 
 namespace geoflow::simulator {
 

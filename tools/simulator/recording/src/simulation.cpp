@@ -1,16 +1,33 @@
 #include "geoflow/tools/simulator/simulation.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <functional>
 #include <map>
+#include <memory>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <tl/expected.hpp>
 
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/imu_simulator.hpp"
+#include "geoflow/tools/simulator/leg_simulator.hpp"
 #include "geoflow/tools/simulator/mount.hpp"
 #include "geoflow/tools/simulator/random_stream.hpp"
+#include "geoflow/tools/simulator/recording_options.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/walk.hpp"
 
 #include "arrivals.hpp"
 #include "body_odometry.hpp"

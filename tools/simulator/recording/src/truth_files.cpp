@@ -1,13 +1,19 @@
 #include "geoflow/tools/simulator/truth_files.hpp"
 
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <ios>
+#include <iterator>
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 namespace geoflow::simulator {

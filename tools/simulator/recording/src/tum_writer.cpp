@@ -2,16 +2,23 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "geoflow/drivers/calibration_file.hpp"
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
 
 namespace geoflow::simulator {
 namespace {
