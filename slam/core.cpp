@@ -17,6 +17,7 @@
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
 #include "map/mapping_problem.hpp"
+#include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/tracker.hpp"
 
@@ -38,6 +39,7 @@ class Core::Impl {
       : config_{config},
         calibration_{calibration},
         T_base_cam_{calibration.T_base_cam.value_or(SE3{})},
+        reckoner_{config.switches, calibration},
         tracker_{config, gicp_, calibration, std::move(grid), observer},
         builder_{config, gicp_, calibration, observer},
         observer_{observer} {}
@@ -47,11 +49,12 @@ class Core::Impl {
     if (shape.width != calibration_.camera.width || shape.height != calibration_.camera.height) {
       return predicted_only(packet);
     }
+    const std::optional<ReckonedMotion> motion = reckoner_.add(packet);
     tracker_.begin_frame(packet);
     if (map_.keyframes().empty()) {
       return start(packet);
     }
-    return follow(packet);
+    return follow(packet, motion);
   }
 
   std::optional<MappingTask> take_mapping_task() {
@@ -89,7 +92,7 @@ class Core::Impl {
   PoseEstimate start(const SyncedPacket& packet) {
     Frame& frame = tracker_.current();
     frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
-    motion_.update(packet.t, frame.T_odom_cam, true);
+    motion_.update(packet.t, frame.T_odom_cam, Matrix6d::Zero(), true);
     insert_keyframe(Matrix6d::Zero());
     records_.push_back({packet.t, reference_, SE3{}});
     PoseEstimate estimate = estimate_at(packet, frame.T_odom_cam);
@@ -99,8 +102,9 @@ class Core::Impl {
     return estimate;
   }
 
-  PoseEstimate follow(const SyncedPacket& packet) {
-    const TrackingResult result = tracker_.track(map_, motion_);
+  PoseEstimate follow(const SyncedPacket& packet, const std::optional<ReckonedMotion>& motion) {
+    const TrackingResult result =
+        tracker_.track(map_, motion_.predict(packet.t, motion), source_of(motion));
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
     const bool depth_fix = result.depth_share > kDepthCarriesOn;
     const bool fixed = result.anchored && (result.visual_fix || depth_fix);
@@ -111,7 +115,7 @@ class Core::Impl {
       frames_lost_ = 0;
       tracker_.current().anchored = true;
     }
-    motion_.update(packet.t, T_odom_cam, result.sure || fixed);
+    motion_.update(packet.t, T_odom_cam, result.covariance, result.sure || fixed || motion);
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.source = result.source;
@@ -176,6 +180,13 @@ class Core::Impl {
     return A * reference.covariance * A.transpose() + drift_;
   }
 
+  static PoseSource source_of(const std::optional<ReckonedMotion>& motion) {
+    if (!motion) {
+      return PoseSource::kConstantVelocity;
+    }
+    return motion->legs ? PoseSource::kLegs : PoseSource::kImu;
+  }
+
   static std::uint8_t quality(const TrackingResult& result) {
     constexpr double kPlentyOfPoints = 100;
     constexpr double kFull = 100;
@@ -209,6 +220,7 @@ class Core::Impl {
   GicpConfig gicp_;
   Calibration calibration_;
   SE3 T_base_cam_;
+  DeadReckoner reckoner_;
   Tracker tracker_;
   MapBuilder builder_;
   MotionModel motion_;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include <Eigen/LU>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
@@ -14,14 +17,22 @@ namespace {
 constexpr double kAcceleration = 5.0;          // [m/s^2]
 constexpr double kAngularAcceleration = 20.0;  // [rad/s^2]
 constexpr double kMemory = 0.1;                // [s]
-/// In this time the acceleration above moves the image further than Lucas-Kanade reaches: 0.4 rad,
-/// or 0.1 m.
-constexpr double kBlind = 0.2;      // [s]
+/// Standard deviations of a prediction beyond what Lucas-Kanade can make up for: where constant
+/// velocity is after 0.2 s.
+constexpr double kBlindRad = 0.4;
+constexpr double kBlindM = 0.1;
 constexpr double kShortest = 1e-3;  // [s]
 
 }  // namespace
 
-void MotionModel::update(HostTime t, const SE3& T_odom_cam, bool followed) {
+bool is_blind(const PosePrior& prior) {
+  const Vector6d variance = prior.information.inverse().diagonal();
+  return variance.head<3>().maxCoeff() > kBlindRad * kBlindRad ||
+         variance.tail<3>().maxCoeff() > kBlindM * kBlindM;
+}
+
+void MotionModel::update(HostTime t, const SE3& T_odom_cam, const Matrix6d& covariance,
+                         bool followed) {
   const double dt = to_seconds(t - t_);
   if (followed && dt > 0 && dt < kMemory * 2) {
     velocity_ = (T_odom_cam_.inverse() * T_odom_cam).log() / dt;
@@ -31,6 +42,7 @@ void MotionModel::update(HostTime t, const SE3& T_odom_cam, bool followed) {
   t_ = t;
   t_followed_ = followed ? t : t_followed_;
   T_odom_cam_ = T_odom_cam;
+  covariance_ = covariance;
 }
 
 SE3 MotionModel::motion_over(Duration duration) const {
@@ -43,17 +55,29 @@ SE3 MotionModel::motion_over(Duration duration) const {
   return SE3::exp(travelled * velocity_);
 }
 
-bool MotionModel::blind(HostTime t) const {
-  return to_seconds(t - t_followed_) > kBlind;
-}
-
-PosePrior MotionModel::predict(HostTime t) const {
+PosePrior MotionModel::predict(HostTime t, const std::optional<ReckonedMotion>& motion) const {
   const double dt = std::max(kShortest, to_seconds(t - t_followed_));
-  const double sigma_rotation = 0.5 * kAngularAcceleration * dt * dt;
-  const double sigma_translation = 0.5 * kAcceleration * dt * dt;
-  Vector6d sigma;
-  sigma << Vector3d::Constant(sigma_rotation), Vector3d::Constant(sigma_translation);
-  return {T_odom_cam_ * motion_over(t - t_), sigma.cwiseInverse().cwiseAbs2().asDiagonal()};
+  SE3 T_cam0_cam1 = motion_over(t - t_);
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>().diagonal().setConstant(
+      std::pow(0.5 * kAngularAcceleration * dt * dt, 2));
+  covariance.bottomRightCorner<3, 3>().diagonal().setConstant(
+      std::pow(0.5 * kAcceleration * dt * dt, 2));
+  if (motion) {
+    const bool knows_way = motion->covariance.bottomRightCorner<3, 3>().trace() <
+                           covariance.bottomRightCorner<3, 3>().trace();
+    if (knows_way) {
+      T_cam0_cam1 = motion->T_cam0_cam1;
+      covariance = motion->covariance;
+    } else {
+      T_cam0_cam1 = SE3{motion->T_cam0_cam1.rotation(), T_cam0_cam1.translation()};
+      covariance.topLeftCorner<3, 3>() = motion->covariance.topLeftCorner<3, 3>();
+    }
+    const Matrix6d A = T_cam0_cam1.inverse().adjoint();
+    covariance += A * covariance_ * A.transpose();
+  }
+  const SE3& T_odom_cam0 = T_odom_cam_;
+  return {T_odom_cam0 * T_cam0_cam1, covariance.inverse()};
 }
 
 void MotionModel::move(const SE3& T_odom1_odom0) {

@@ -5,9 +5,13 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "odometry/dead_reckoner.hpp"
 #include "odometry/pose_optimiser.hpp"
 
 namespace geoflow::slam {
+
+/// Whether a prediction is so uncertain that it is no start for following features.
+[[nodiscard]] bool is_blind(const PosePrior& prior);
 
 /// Constant velocity with white-noise acceleration: the last resort of the paper's order (section
 /// IV-B), and the prior that holds directions in which nothing is seen. Thread-compatible.
@@ -15,15 +19,14 @@ class MotionModel {
  public:
   /// Takes over a tracked pose. `followed`: whether it follows from the one before by something
   /// seen; if not, the velocity fades.
-  void update(HostTime t, const SE3& T_odom_cam, bool followed);
+  /// `covariance`: of a right perturbation of the pose.
+  void update(HostTime t, const SE3& T_odom_cam, const Matrix6d& covariance, bool followed);
 
-  /// The pose expected at `t` with its information. Beyond kMemory the velocity says nothing any
-  /// more and fades: after a gap the camera is as likely to have stopped.
-  [[nodiscard]] PosePrior predict(HostTime t) const;
-
-  /// Whether at `t` no pose has followed from another for so long that the prediction is no start
-  /// for following features.
-  [[nodiscard]] bool blind(HostTime t) const;
+  /// The pose expected at `t` with its information: by `motion` since the last update, in so far as
+  /// it knows better than constant velocity. Beyond kMemory the velocity says nothing any more and
+  /// fades: after a gap the camera is as likely to have stopped.
+  [[nodiscard]] PosePrior predict(HostTime t,
+                                  const std::optional<ReckonedMotion>& motion = std::nullopt) const;
 
   /// The pose of the camera at a time near the last update, by its velocity.
   [[nodiscard]] SE3 motion_over(Duration duration) const;
@@ -38,6 +41,7 @@ class MotionModel {
   HostTime t_;
   HostTime t_followed_;  ///< of the last update that followed
   SE3 T_odom_cam_;
+  Matrix6d covariance_ = Matrix6d::Zero();  ///< of T_odom_cam_
   Vector6d velocity_ = Vector6d::Zero();
 };
 

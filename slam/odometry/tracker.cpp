@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/gicp_search.hpp"
@@ -153,7 +155,7 @@ std::vector<VisualMatch> Tracker::matches(const Map& map,
   return found;
 }
 
-Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
+Tracker::InitialPose Tracker::initial_pose(const InitialPose& predicted,
                                            std::span<const VisualMatch> matches) const {
   const StageScope scope{observer_, Stage::kPoseInitialisation};
   // Tracks have been checked forward and backward: half of them should agree.
@@ -166,14 +168,14 @@ Tracker::InitialPose Tracker::initial_pose(const SE3& predicted,
   }
   if (config_.switches.gicp && current_.cloud && previous_.cloud) {
     const SE3& T_odom_target = previous_.T_odom_cam;
-    const RegistrationResult found = register_from_afar(*current_.cloud, *previous_.cloud,
-                                                        T_odom_target.inverse() * predicted, gicp_);
+    const RegistrationResult found = register_from_afar(
+        *current_.cloud, *previous_.cloud, T_odom_target.inverse() * predicted.T_odom_cam, gicp_);
     if (found.converged) {
       return {T_odom_target * found.T_target_source, PoseSource::kGicp,
               found.overlap > kGoodOverlap};
     }
   }
-  return {predicted, PoseSource::kConstantVelocity, false};
+  return predicted;
 }
 
 void Tracker::keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
@@ -204,13 +206,14 @@ void Tracker::follow(const Map& map, const SE3& T_odom_cam_predicted) {
   }
 }
 
-Tracker::InitialPose Tracker::first_guess(const Map& map, const PosePrior& prior, bool blind) {
-  follow(map, prior.T_odom_cam);
-  InitialPose initial = initial_pose(prior.T_odom_cam, matches(map));
+Tracker::InitialPose Tracker::first_guess(const Map& map, const InitialPose& predicted,
+                                          bool blind) {
+  follow(map, predicted.T_odom_cam);
+  InitialPose initial = initial_pose(predicted, matches(map));
   const bool held = previous_.anchored && !blind;
   current_.anchored = held;
   if (!held || !initial.sure) {
-    if (const std::optional<SE3> pose = relocate(map, prior.T_odom_cam)) {
+    if (const std::optional<SE3> pose = relocate(map, predicted.T_odom_cam)) {
       current_.anchored = true;
       return {*pose, PoseSource::kPnp, true};
     }
@@ -222,7 +225,7 @@ Tracker::InitialPose Tracker::first_guess(const Map& map, const PosePrior& prior
       feature.anchor.reset();
     }
     if (initial.source == PoseSource::kPnp) {
-      initial = initial_pose(prior.T_odom_cam, {});
+      initial = initial_pose(predicted, {});
     }
   }
   return initial;
@@ -251,11 +254,10 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   return targets;
 }
 
-TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
+TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predicted_by) {
   TrackingResult result;
-  const PosePrior prior = motion.predict(current_.t);
-  const bool blind = motion.blind(current_.t);
-  const InitialPose initial = first_guess(map, prior, blind);
+  const bool blind = is_blind(prior);
+  const InitialPose initial = first_guess(map, {prior.T_odom_cam, predicted_by, false}, blind);
   result.source = initial.source;
   result.sure = initial.sure;
   result.anchored = current_.anchored;
@@ -269,9 +271,8 @@ TrackingResult Tracker::track(Map& map, const MotionModel& motion) {
       {.matches = visual, .cloud = current_.cloud.get(), .targets = targets, .prior = prior},
       initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
-  result.covariance = initial.sure
-                          ? result.solution.covariance
-                          : Matrix6d{prior.information.diagonal().cwiseInverse().asDiagonal()};
+  result.covariance =
+      initial.sure ? result.solution.covariance : Matrix6d{prior.information.inverse()};
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);
   result.visual_fix = result.solution.visual_inliers >= enough;

@@ -44,8 +44,9 @@ class Tracker {
   /// Reads a packet's images into the current frame, and the one before into previous().
   void begin_frame(const SyncedPacket& packet);
 
-  /// Pose of the current frame. Features that contradict it are dropped from the frame.
-  [[nodiscard]] TrackingResult track(Map& map, const MotionModel& motion);
+  /// Pose of the current frame, given its prediction and what made it. Features that contradict it
+  /// are dropped from the frame.
+  [[nodiscard]] TrackingResult track(Map& map, const PosePrior& prior, PoseSource predicted_by);
 
   [[nodiscard]] Frame& current() noexcept { return current_; }
   [[nodiscard]] const Frame& current() const noexcept { return current_; }
@@ -71,9 +72,9 @@ class Tracker {
   /// The frame's features that show map points, and, where asked for, which features they are.
   [[nodiscard]] std::vector<VisualMatch> matches(
       const Map& map, std::vector<std::size_t>* feature_of_match = nullptr) const;
-  [[nodiscard]] InitialPose initial_pose(const SE3& predicted,
+  [[nodiscard]] InitialPose initial_pose(const InitialPose& predicted,
                                          std::span<const VisualMatch> matches) const;
-  [[nodiscard]] InitialPose first_guess(const Map& map, const PosePrior& prior, bool blind);
+  [[nodiscard]] InitialPose first_guess(const Map& map, const InitialPose& predicted, bool blind);
   void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
                     const PoseSolution& solution);
   [[nodiscard]] Feature feature_at(const Vector2d& raw) const;

@@ -17,7 +17,7 @@ const Vector6d kTwist = (Vector6d() << 0.1, -0.2, 0.3, 0.5, 0.1, -0.4).finished(
 MotionModel moving_until(HostTime end, Duration step) {
   MotionModel motion;
   for (HostTime t{}; t <= end; t += step) {
-    motion.update(t, SE3::exp(to_seconds(t.time_since_epoch()) * kTwist), true);
+    motion.update(t, SE3::exp(to_seconds(t.time_since_epoch()) * kTwist), Matrix6d::Zero(), true);
   }
   return motion;
 }
@@ -40,7 +40,7 @@ TEST(MotionModel, ForgetsItsVelocityOverAGapAndSaysSo) {
 TEST(MotionModel, UntrustedPosesDoNotChangeTheVelocityBeyondFading) {
   MotionModel motion = moving_until(HostTime{milliseconds{990}}, milliseconds{33});
   const Vector6d before = motion.velocity();
-  motion.update(HostTime{milliseconds{1023}}, SE3{}, false);
+  motion.update(HostTime{milliseconds{1023}}, SE3{}, Matrix6d::Zero(), false);
   EXPECT_NEAR(motion.velocity().norm() / before.norm(), 0.72, 0.02);  // exp(-33 ms / 100 ms)
 }
 

@@ -16,6 +16,9 @@ struct Switches {
   /// Depth registered to the map: surfels of keyframes that see the same surfaces (IV-C, equation
   /// (6)).
   bool depth_to_map = true;
+  bool imu = true;  ///< the IMU predicts motion, where its place on the camera is known (IV-B)
+  bool legs =
+      true;  ///< so do legs or body velocities, where the camera's place on the robot is known
 };
 
 // NOLINTBEGIN(readability-magic-numbers): each number is the value of a member that names it

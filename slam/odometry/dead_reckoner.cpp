@@ -1,0 +1,111 @@
+#include "odometry/dead_reckoner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+
+#include "legs/leg_odometry.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+/// Of a robot's own odometry: standard deviation of its velocity, and of its scale.
+constexpr double kTwistSigmaMps = 0.05;
+constexpr double kTwistSigmaRadps = 0.1;
+constexpr double kTwistScale = 0.03;
+
+LegConfig leg_config(const Calibration& calibration) {
+  LegConfig config;
+  config.T_base_imu = calibration.T_base_cam.value_or(SE3{}) * *calibration.T_cam_imu;
+  config.imu_noise = calibration.imu_noise;
+  return config;
+}
+
+double squared(double x) {
+  return x * x;
+}
+
+}  // namespace
+
+DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibration)
+    : switches_{switches},
+      T_base_cam_{calibration.T_base_cam.value_or(SE3{})},
+      imu_noise_{calibration.imu_noise},
+      base_known_{calibration.T_base_cam.has_value()} {
+  if (switches.imu && calibration.T_cam_imu) {
+    odometry_.emplace(leg_config(calibration));
+  }
+}
+
+std::optional<ReckonedMotion> DeadReckoner::add(const SyncedPacket& packet) {
+  std::optional<ReckonedMotion> motion;
+  if (odometry_) {
+    motion = by_inertia(packet);
+  }
+  if ((!motion || !motion->legs) && switches_.legs && base_known_) {
+    if (const auto twist = by_twist(packet)) {
+      motion = twist;
+    }
+  }
+  t_last_ = packet.t;
+  return motion;
+}
+
+ReckonedMotion DeadReckoner::of_camera(const SE3& T_base0_base1, const Matrix6d& covariance,
+                                       bool legs) const {
+  const SE3 T_cam_base = T_base_cam_.inverse();
+  const Matrix6d A = T_cam_base.adjoint();
+  return {T_cam_base * T_base0_base1 * T_base_cam_, A * covariance * A.transpose(), legs};
+}
+
+std::optional<ReckonedMotion> DeadReckoner::by_inertia(const SyncedPacket& packet) {
+  const std::vector<Timed<LegSample>> none;
+  const bool legs = switches_.legs && base_known_;
+  const auto before = last_;
+  last_ = odometry_->add(packet.imu, legs ? packet.legs : none, packet.t);
+  if (!before || !last_) {
+    return std::nullopt;
+  }
+  const double dt = to_seconds(last_->t - before->t);
+  const SE3 T_base0_base1 = before->T_odom_base.inverse() * last_->T_odom_base;
+  // Where measurements contradict the prediction, all of it is to be believed less.
+  const double doubt = std::max(1.0, last_->health.nis);
+  const double turned = T_base0_base1.log().head<3>().norm();
+  constexpr double kGyroScale = 0.01;  // a MEMS gyroscope's scale error
+  const double rotation =
+      squared(imu_noise_.gyro_noise_density) * dt + squared(kGyroScale * turned);
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>() = rotation * Matrix3d::Identity();
+  covariance.bottomRightCorner<3, 3>() = last_->velocity.covariance * (dt * dt);
+  return of_camera(T_base0_base1, doubt * covariance, last_->health.contact_s > 0);
+}
+
+std::optional<ReckonedMotion> DeadReckoner::by_twist(const SyncedPacket& packet) const {
+  if (packet.body_velocity.empty() || !t_last_) {
+    return std::nullopt;
+  }
+  Vector6d twist = Vector6d::Zero();
+  for (const Timed<BodyVelocitySample>& sample : packet.body_velocity) {
+    twist.head<3>() += sample.sample.w_base_radps;
+    twist.tail<3>() += sample.sample.v_base_mps;
+  }
+  const double dt = to_seconds(packet.t - *t_last_);
+  const Vector6d moved = dt / static_cast<double>(packet.body_velocity.size()) * twist;
+  if (!moved.allFinite()) {
+    return std::nullopt;
+  }
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>().diagonal().setConstant(
+      squared(kTwistSigmaRadps * dt) + squared(kTwistScale) * moved.head<3>().squaredNorm());
+  covariance.bottomRightCorner<3, 3>().diagonal().setConstant(
+      squared(kTwistSigmaMps * dt) + squared(kTwistScale) * moved.tail<3>().squaredNorm());
+  return of_camera(SE3::exp(moved), covariance, true);
+}
+
+}  // namespace geoflow::slam
