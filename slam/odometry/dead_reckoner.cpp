@@ -20,6 +20,8 @@ constexpr double kTwistSigmaMps = 0.05;
 constexpr double kTwistSigmaRadps = 0.1;
 constexpr double kTwistScale = 0.03;
 
+constexpr double kUnknownM = 1;  ///< of a way that is not known
+
 LegConfig leg_config(const Calibration& calibration) {
   LegConfig config;
   config.T_base_imu = calibration.T_base_cam.value_or(SE3{}) * *calibration.T_cam_imu;
@@ -82,7 +84,12 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(const SyncedPacket& packe
       squared(imu_noise_.gyro_noise_density) * dt + squared(kGyroScale * turned);
   Matrix6d covariance = Matrix6d::Zero();
   covariance.topLeftCorner<3, 3>() = rotation * Matrix3d::Identity();
-  covariance.bottomRightCorner<3, 3>() = last_->velocity.covariance * (dt * dt);
+  if (legs && !packet.legs.empty()) {
+    covariance.bottomRightCorner<3, 3>() = last_->velocity.covariance * (dt * dt);
+  } else {
+    // A velocity that nothing corrects is anything after a few steps.
+    covariance.bottomRightCorner<3, 3>().diagonal().setConstant(squared(kUnknownM));
+  }
   return of_camera(T_base0_base1, doubt * covariance, last_->health.contact_s > 0);
 }
 

@@ -35,7 +35,8 @@ class LocalBundleAdjustment {
   MappingSolution solve() {
     solution_ = std::make_unique<MappingSolution>();
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
-      poses_[keyframe.id] = to_block(keyframe.T_odom_cam);
+      index_.emplace(keyframe.id, poses_.size());
+      poses_.push_back(to_block(keyframe.T_odom_cam));
     }
     measure_edges();
     estimate_pixel_sigma();
@@ -48,10 +49,9 @@ class LocalBundleAdjustment {
   }
 
  private:
-  const MappingKeyframe& keyframe(KeyframeId id) const {
-    return *std::find_if(problem_.keyframes.begin(), problem_.keyframes.end(),
-                         [&](const MappingKeyframe& k) { return k.id == id; });
-  }
+  const MappingKeyframe& keyframe(KeyframeId id) const { return problem_.keyframes[index_.at(id)]; }
+  PoseBlock& pose(KeyframeId id) { return poses_[index_.at(id)]; }
+  const PoseBlock& pose(KeyframeId id) const { return poses_[index_.at(id)]; }
 
   void measure_edges() {
     for (const auto& [from, to] : problem_.edges_to_measure) {
@@ -66,7 +66,7 @@ class LocalBundleAdjustment {
   }
 
   Vector2d residual(const Observation& observation, const Vector3d& p_odom) const {
-    const Vector3d p_cam = from_block(poses_.at(observation.keyframe).data()).inverse() * p_odom;
+    const Vector3d p_cam = from_block(pose(observation.keyframe).data()).inverse() * p_odom;
     return camera_.project(p_cam) - observation.pixel;
   }
 
@@ -98,7 +98,7 @@ class LocalBundleAdjustment {
 
   void add_keyframes() {
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
-      double* block = poses_.at(keyframe.id).data();
+      double* block = pose(keyframe.id).data();
       ceres_.AddParameterBlock(block, kPoseSize, &manifold_);
       ordering_->AddElementToGroup(block, 1);
       if (keyframe.fixed) {
@@ -115,13 +115,14 @@ class LocalBundleAdjustment {
       ceres_.AddParameterBlock(block, 3);
       ordering_->AddElementToGroup(block, 0);
       for (const Observation& observation : point.observations) {
-        double* pose = poses_.at(observation.keyframe).data();
-        add_factor<ReprojectionFactor>(&visual_loss_, {pose, block}, camera_, observation.pixel,
-                                       sigma_px_);
+        double* pose_block = pose(observation.keyframe).data();
+        add_factor<ReprojectionFactor>(&visual_loss_, {pose_block, block}, camera_,
+                                       observation.pixel, sigma_px_);
         if (observation.depth_m > 0) {
           const double sigma_m =
               problem_.mapping.depth_sigma_at_1m * observation.depth_m * observation.depth_m;
-          add_factor<PointDepthFactor>(&visual_loss_, {pose, block}, observation.depth_m, sigma_m);
+          add_factor<PointDepthFactor>(&visual_loss_, {pose_block, block}, observation.depth_m,
+                                       sigma_m);
         }
       }
     }
@@ -129,8 +130,7 @@ class LocalBundleAdjustment {
 
   void add_edges() {
     const auto add = [&](const DepthEdge& edge) {
-      add_factor<RelativePoseFactor>(&edge_loss_,
-                                     {poses_.at(edge.from).data(), poses_.at(edge.to).data()},
+      add_factor<RelativePoseFactor>(&edge_loss_, {pose(edge.from).data(), pose(edge.to).data()},
                                      edge.T_from_to, edge.information);
     };
     std::for_each(problem_.edges.begin(), problem_.edges.end(), add);
@@ -152,7 +152,7 @@ class LocalBundleAdjustment {
     constexpr double kChi2Of2At99Percent = 9.21;
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
       if (!keyframe.fixed) {
-        solution_->T_odom_cam.emplace(keyframe.id, from_block(poses_.at(keyframe.id).data()));
+        solution_->T_odom_cam.emplace(keyframe.id, from_block(pose(keyframe.id).data()));
       }
     }
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -170,7 +170,10 @@ class LocalBundleAdjustment {
 
   const MappingProblem& problem_;
   CameraModel camera_;
-  std::map<KeyframeId, PoseBlock> poses_;
+  std::map<KeyframeId, std::size_t> index_;
+  /// In the problem's order, in one piece: Ceres orders the blocks of a group by their addresses,
+  /// and the order of a sum decides its last bits.
+  std::vector<PoseBlock> poses_;
   std::vector<Vector3d> points_;
   double sigma_px_ = 1;
   std::unique_ptr<MappingSolution> solution_;

@@ -1,0 +1,173 @@
+#include "odometry/dead_reckoner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/simulator/imu_simulator.hpp"
+#include "geoflow/tools/simulator/leg_simulator.hpp"
+#include "geoflow/tools/simulator/mount.hpp"
+
+#include "simulator/walk_fixture.hpp"
+
+/// Dead reckoning from frame to frame on simulated walks, against their exact truth.
+namespace geoflow::slam {
+namespace {
+
+using simulator::tests::walk_for;
+
+constexpr double kWalkS = 20;
+constexpr double kFrameS = 1.0 / 30;
+
+HostTime at(double t_s) {
+  return HostTime{Duration{std::llround(t_s * 1e9)}};
+}
+
+/// The samples of a walk by packet: those in (previous, t] and the next one behind.
+template <typename Sample>
+std::vector<Timed<Sample>> window(const std::vector<Timed<Sample>>& all, HostTime after,
+                                  HostTime until) {
+  std::vector<Timed<Sample>> in;
+  for (const auto& sample : all) {
+    if (sample.t > after) {
+      in.push_back(sample);
+      if (sample.t >= until) {
+        break;
+      }
+    }
+  }
+  return in;
+}
+
+/// One simulated walk, and what a reckoner makes of it.
+class Walked {
+ public:
+  explicit Walked(std::uint64_t seed)
+      : walk_{walk_for(kWalkS, {.seed = seed})},
+        T_base_cam_{simulator::go2_T_base_cam()},
+        T_base_imu_{T_base_cam_ * simulator::d435i_T_cam_imu()} {
+    calibration.T_base_cam = T_base_cam_;
+    calibration.T_cam_imu = simulator::d435i_T_cam_imu();
+    for (const auto& r : simulator::ImuSimulator{walk_, T_base_imu_, seed, {}}.readings()) {
+      imu_.push_back({at(r.t_s), {}, r.sample});
+    }
+    const simulator::LegSimulator legs{walk_, seed, {}};
+    for (std::size_t i = 0; i < legs.size(); ++i) {
+      const auto r = legs.reading(i);
+      legs_.push_back({at(r.t_s), {}, r.sample});
+      const auto body = walk_.state(r.t_s).body;
+      twist_.push_back({at(r.t_s),
+                        {},
+                        {.v_base_mps = body.T_world_base.rotation().inverse() * body.v_world_base,
+                         .w_base_radps = body.w_base}});
+    }
+  }
+
+  struct Account {
+    int motions = 0;
+    int by_legs = 0;
+    double nees_rotation = 0;     ///< per degree of freedom, mean
+    double nees_translation = 0;  ///< likewise
+    double worst_m = 0;           ///< largest error of translation over a frame
+  };
+
+  Account reckon(const Switches& switches, bool legs, bool twist) const {
+    DeadReckoner reckoner{switches, calibration};
+    Account account;
+    HostTime before = at(0);
+    for (double t_s = kFrameS; t_s < kWalkS - kFrameS; t_s += kFrameS) {
+      SyncedPacket packet;
+      packet.t = at(t_s);
+      packet.imu = window(imu_, before, packet.t);
+      packet.legs = legs ? window(legs_, before, packet.t) : std::vector<Timed<LegSample>>{};
+      packet.body_velocity =
+          twist ? window(twist_, before, packet.t) : std::vector<Timed<BodyVelocitySample>>{};
+      const auto motion = reckoner.add(packet);
+      if (motion) {
+        const SE3 truth = T_world_cam(t_s - kFrameS).inverse() * T_world_cam(t_s);
+        const Vector6d error = (motion->T_cam0_cam1.inverse() * truth).log();
+        const Vector3d rotation = error.head<3>();
+        const Vector3d translation = error.tail<3>();
+        ++account.motions;
+        account.by_legs += motion->legs ? 1 : 0;
+        account.nees_rotation +=
+            rotation.dot(motion->covariance.topLeftCorner<3, 3>().ldlt().solve(rotation)) / 3;
+        account.nees_translation +=
+            translation.dot(
+                motion->covariance.bottomRightCorner<3, 3>().ldlt().solve(translation)) /
+            3;
+        account.worst_m = std::max(account.worst_m, translation.norm());
+      }
+      before = packet.t;
+    }
+    account.nees_rotation /= std::max(1, account.motions);
+    account.nees_translation /= std::max(1, account.motions);
+    return account;
+  }
+
+  Calibration calibration;
+
+ private:
+  [[nodiscard]] SE3 T_world_cam(double t_s) const {
+    const SE3 T_world_base = walk_.state(t_s).body.T_world_base;
+    return T_world_base * T_base_cam_;
+  }
+
+  simulator::Walk walk_;
+  SE3 T_base_cam_;
+  SE3 T_base_imu_;
+  std::vector<Timed<ImuSample>> imu_;
+  std::vector<Timed<LegSample>> legs_;
+  std::vector<Timed<BodyVelocitySample>> twist_;
+};
+
+TEST(DeadReckoner, KnowsEachStepOfAWalkByImuAndLegsAndHowWell) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const auto account = Walked{seed}.reckon({}, true, false);
+    EXPECT_GT(account.motions, 500);
+    EXPECT_GT(account.by_legs, 500);
+    EXPECT_GT(account.nees_rotation, 0.2) << "seed " << seed;
+    EXPECT_LT(account.nees_rotation, 2) << "seed " << seed;
+    EXPECT_GT(account.nees_translation, 0.2) << "seed " << seed;
+    EXPECT_LT(account.nees_translation, 2) << "seed " << seed;
+    EXPECT_LT(account.worst_m, 0.01) << "seed " << seed;
+  }
+}
+
+TEST(DeadReckoner, KnowsTheTurnByTheImuAlone) {
+  const auto account = Walked{4}.reckon({.legs = false}, true, false);
+  EXPECT_GT(account.motions, 500);
+  EXPECT_EQ(account.by_legs, 0);
+  EXPECT_GT(account.nees_rotation, 0.2);
+  EXPECT_LT(account.nees_rotation, 2);
+  EXPECT_LT(account.nees_translation, 0.1) << "what it does not know, it says it does not";
+}
+
+TEST(DeadReckoner, TakesTheRobotsOwnOdometryWhereItGivesNoJoints) {
+  const auto account = Walked{5}.reckon({.imu = false}, false, true);
+  EXPECT_GT(account.motions, 500);
+  EXPECT_EQ(account.by_legs, account.motions);
+  EXPECT_LT(account.nees_rotation, 1);
+  EXPECT_LT(account.nees_translation, 1);
+}
+
+TEST(DeadReckoner, SaysNothingWithoutSensorsOrTheirPlace) {
+  Walked walked{6};
+  EXPECT_EQ(walked.reckon({.imu = false, .legs = false}, true, true).motions, 0);
+  walked.calibration.T_base_cam.reset();
+  walked.calibration.T_cam_imu.reset();
+  EXPECT_EQ(walked.reckon({}, true, true).motions, 0);
+}
+
+}  // namespace
+}  // namespace geoflow::slam
