@@ -67,10 +67,13 @@ ReckonedMotion DeadReckoner::of_camera(const SE3& T_base0_base1, const Matrix6d&
 }
 
 std::optional<ReckonedMotion> DeadReckoner::by_inertia(const SyncedPacket& packet) {
-  const std::vector<Timed<LegSample>> none;
   const bool legs = switches_.legs && base_known_;
   const auto before = last_;
-  last_ = odometry_->add(packet.imu, legs ? packet.legs : none, packet.t);
+  MotionSamples samples{.imu = packet.imu, .legs = {}, .body_velocity = {}};
+  if (legs) {
+    samples.legs = packet.legs;
+  }
+  last_ = odometry_->add(samples, packet.t);
   if (!before || !last_) {
     return std::nullopt;
   }
