@@ -70,8 +70,8 @@ class Sender {
       const int turned = (part * kStride + static_cast<int>(key & kTurns)) % sampling_.rays_a_pixel;
       const std::uint64_t bits = scramble(key + static_cast<std::uint64_t>(part) + 1);
       const float x = (static_cast<float>(turned) + to_unit(bits)) / strata - 0.5F;
-      const float y = (static_cast<float>(part) + to_unit(bits << kHalf)) / strata - 0.5F;
-      const float when = to_unit(scramble(bits));
+      const float y = (static_cast<float>(part) + to_unit(bits << kOthers)) / strata - 0.5F;
+      const float when = to_unit(bits << (2 * kOthers));
       const View& begin = views_->view(row, static_cast<std::size_t>(part));
       const View& end = views_->view(row, static_cast<std::size_t>(part) + 1);
       const Vector3f local =
@@ -98,7 +98,7 @@ class Sender {
  private:
   static constexpr std::uint64_t kTurns = 0xff;
   static constexpr int kStride = 1;
-  static constexpr unsigned kHalf = 24;  // the bits below those that to_unit() takes
+  static constexpr unsigned kOthers = 20;  // brings bits to the top that differ from those above
 
   Pinhole pinhole_;
   Shutter shutter_;

@@ -71,8 +71,8 @@ InfraredView see_infrared(const RayScene& rays, const Shader& shader,
       }
       const std::size_t pixel =
           static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i));
-      const Surface surface =
-          shader.surface(packet, i, {.footprint_per_t = pinhole.inverse_fx, .spread = 1, .key = 0});
+      const Surface surface = shader.surface(
+          packet, i, {.footprint_per_t = pinhole.inverse_fx, .quickly = true, .contrast = true});
       seen.depth_m[pixel] = packet.ray.tfar[i];
       seen.signal[pixel] = signal_of(surface, packet.ray.tfar[i], sun_lux, projector_power);
     }

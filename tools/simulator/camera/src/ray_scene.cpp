@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -20,27 +22,64 @@ using Eigen::Vector3f;
 
 constexpr float kNear_m = 1e-3F;
 constexpr float kGap_m = 2e-3F;
-constexpr std::size_t kCapsuleFloats = 8;  // two ends of x, y, z, radius
+// A capsule's facets: rings of corners, from pole to pole. Embree's own round curves cost a second
+// traversal of every ray.
+constexpr std::size_t kSides = 10;
+constexpr std::size_t kCapRings = 3;  // the pole, one between, the equator
+constexpr std::size_t kRings = 2 * kCapRings;
+constexpr std::size_t kFacets = (kRings - 1) * kSides;
+constexpr std::size_t kCorners = kRings * kSides;
 
 void write_capsule(const Capsule& capsule, float* out) {
-  const std::array<float, kCapsuleFloats> values{
-      capsule.start.x(), capsule.start.y(), capsule.start.z(), capsule.start_radius_m,
-      capsule.end.x(),   capsule.end.y(),   capsule.end.z(),   capsule.end_radius_m};
-  std::ranges::copy(values, out);
+  constexpr float kSteep = 0.9F;
+  constexpr float kShortest_m = 1e-6F;
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const Vector3f along = capsule.end - capsule.start;
+  const Vector3f axis =
+      along.norm() > kShortest_m ? Vector3f{along.normalized()} : Vector3f{Vector3f::UnitZ()};
+  const Vector3f side = (std::abs(axis.z()) < kSteep ? Vector3f::UnitZ() : Vector3f::UnitX())
+                            .cross(axis)
+                            .normalized();
+  const Vector3f other = axis.cross(side);
+  for (std::size_t ring = 0; ring < kRings; ++ring) {
+    const bool first = ring < kCapRings;
+    const float radius = first ? capsule.start_radius_m : capsule.end_radius_m;
+    const std::size_t from_equator = first ? kCapRings - 1 - ring : ring - kCapRings;
+    const float latitude =
+        0.5F * kPi * static_cast<float>(from_equator) / static_cast<float>(kCapRings - 1);
+    const Vector3f centre = (first ? capsule.start : capsule.end) +
+                            (first ? -1.0F : 1.0F) * radius * std::sin(latitude) * axis;
+    for (std::size_t i = 0; i < kSides; ++i) {
+      const float turn = 2.0F * kPi * static_cast<float>(i) / static_cast<float>(kSides);
+      const Vector3f corner =
+          centre + radius * std::cos(latitude) * (std::cos(turn) * side + std::sin(turn) * other);
+      out = std::ranges::copy(std::span{corner.data(), 3}, out).out;
+    }
+  }
 }
 
-float* new_vertices(RTCGeometry geometry, unsigned slot, std::size_t capsules) {
-  return static_cast<float*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, slot, RTC_FORMAT_FLOAT4,
-                              kCapsuleFloats / 2 * sizeof(float), 2 * capsules));
+float* new_corners(RTCGeometry geometry, unsigned slot, std::size_t count) {
+  return static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, slot,
+                                                     RTC_FORMAT_FLOAT3, 3 * sizeof(float), count));
 }
 
-/// One segment a capsule, each with round ends.
-void set_segments(RTCGeometry geometry, std::size_t capsules) {
-  auto* first = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, sizeof(unsigned), capsules));
-  for (std::size_t i = 0; i < capsules; ++i) {
-    first[i] = static_cast<unsigned>(2 * i);
+unsigned* new_quads(RTCGeometry geometry, std::size_t count) {
+  return static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(unsigned), count));
+}
+
+void set_facets(RTCGeometry geometry, std::size_t capsules) {
+  unsigned* out = new_quads(geometry, capsules * kFacets);
+  for (std::size_t capsule = 0; capsule < capsules; ++capsule) {
+    for (std::size_t facet = 0; facet < kFacets; ++facet) {
+      const std::size_t ring = capsule * kCorners + facet / kSides * kSides;
+      const std::size_t here = facet % kSides;
+      const std::size_t next = (here + 1) % kSides;
+      for (const std::size_t corner :
+           {ring + here, ring + next, ring + kSides + next, ring + kSides + here}) {
+        *out++ = static_cast<unsigned>(corner);
+      }
+    }
   }
 }
 
@@ -94,12 +133,8 @@ void RayScene::attach(RTCGeometry geometry, HitKind kind, bool moves) {
 void RayScene::add_patches() {
   const std::vector<Patch>& patches = scene_->patches;
   const Owned<RTCGeometry> geometry{rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD)};
-  auto* vertices = static_cast<float*>(
-      rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                              3 * sizeof(float), 4 * patches.size()));
-  auto* indices = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                              4 * sizeof(unsigned), patches.size()));
+  float* vertices = new_corners(geometry.get(), 0, 4 * patches.size());
+  unsigned* indices = new_quads(geometry.get(), patches.size());
   unsigned next = 0;
   for (const Patch& patch : patches) {
     for (const Vector3f& corner : patch.corners) {
@@ -116,13 +151,12 @@ void RayScene::add_capsules() {
   if (capsules.empty()) {
     return;
   }
-  const Owned<RTCGeometry> geometry{
-      rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE)};
-  float* vertices = new_vertices(geometry.get(), 0, capsules.size());
+  const Owned<RTCGeometry> geometry{rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD)};
+  float* vertices = new_corners(geometry.get(), 0, kCorners * capsules.size());
   for (std::size_t i = 0; i < capsules.size(); ++i) {
-    write_capsule(capsules[i], vertices + kCapsuleFloats * i);
+    write_capsule(capsules[i], vertices + 3 * kCorners * i);
   }
-  set_segments(geometry.get(), capsules.size());
+  set_facets(geometry.get(), capsules.size());
   attach(geometry.get(), HitKind::kCapsule, false);
 }
 
@@ -131,11 +165,12 @@ void RayScene::add_people() {
   if (count == 0) {
     return;
   }
-  people_.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE));
+  people_.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD));
   rtcSetGeometryTimeStepCount(people_.get(), 2);
   people_begin_.resize(count);
-  people_vertices_ = {new_vertices(people_.get(), 0, count), new_vertices(people_.get(), 1, count)};
-  set_segments(people_.get(), count);
+  people_vertices_ = {new_corners(people_.get(), 0, kCorners * count),
+                      new_corners(people_.get(), 1, kCorners * count)};
+  set_facets(people_.get(), count);
   move_people(0, 0);
   attach(people_.get(), HitKind::kPerson, true);
 }
@@ -149,8 +184,8 @@ void RayScene::move_people(double begin_s, double end_s) {
     const auto begin = person.body(begin_s);
     const auto end = person.body(end_s);
     for (std::size_t i = 0; i < begin.size(); ++i, ++next) {
-      write_capsule(begin[i], people_vertices_[0] + kCapsuleFloats * next);
-      write_capsule(end[i], people_vertices_[1] + kCapsuleFloats * next);
+      write_capsule(begin[i], people_vertices_[0] + 3 * kCorners * next);
+      write_capsule(end[i], people_vertices_[1] + 3 * kCorners * next);
       people_begin_[next] = begin[i];
     }
   }
@@ -158,6 +193,12 @@ void RayScene::move_people(double begin_s, double end_s) {
   rtcUpdateGeometryBuffer(people_.get(), RTC_BUFFER_TYPE_VERTEX, 1);
   rtcCommitGeometry(people_.get());
   rtcCommitScene(all_.get());
+}
+
+std::size_t RayScene::primitive(const RayPacket& packet, std::size_t lane) {
+  const std::size_t number = packet.hit.primID[lane];
+  return packet.hit.geomID[lane] == static_cast<unsigned>(HitKind::kPatch) ? number
+                                                                           : number / kFacets;
 }
 
 void RayScene::reset(RayPacket& packet) {

@@ -37,7 +37,10 @@ class RayScene {
   /// Is there something that stands still between `from` and `to`, 2 mm from either?
   [[nodiscard]] bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;
 
-  /// A person's capsule at time 0 of the interval, by Embree's primitive number.
+  /// The number of the patch, of the capsule or of the person's capsule that a lane hit.
+  [[nodiscard]] static std::size_t primitive(const RayPacket& packet, std::size_t lane);
+
+  /// A person's capsule at time 0 of the interval, by that number.
   [[nodiscard]] const Capsule& person_capsule(std::size_t primitive) const {
     return people_begin_[primitive];
   }

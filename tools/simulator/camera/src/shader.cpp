@@ -23,7 +23,8 @@ using Eigen::Vector3f;
 constexpr float kInversePi = std::numbers::inv_pi_v<float>;
 constexpr float kFlattest = 0.02F;         // cosine below which a footprint does not grow further
 constexpr float kFaintestMirror = 0.004F;  // below this a reflection is not traced
-constexpr float kBrightestGlint = 1.5F;    // of white paper in the same light
+constexpr float kShortest_m2 = 1e-8F;
+constexpr float kBrightestGlint = 1.5F;  // of white paper in the same light
 constexpr float kFaintest_nit = 1e-6F;
 constexpr float kBodyRadius_m = 0.26F;
 constexpr float kBody_m = 1.0F;  // the height of a body's middle
@@ -104,18 +105,23 @@ void Shader::look_at_patch(std::size_t index, const Look& look, float t, Surface
   const Texture& texture = scene_->textures[static_cast<std::size_t>(material.texture)];
   const float texture_u = u + patch.texture_offset_m.x();
   const float texture_v = v + patch.texture_offset_m.y();
-  surface.albedo *= texture.sample(texture_u, texture_v, footprint);
-  surface.contrast = texture.contrast(footprint);
+  surface.albedo *= look.quickly ? texture.sample_quickly(texture_u, texture_v, footprint)
+                                 : texture.sample(texture_u, texture_v, footprint);
+  if (look.contrast) {
+    surface.contrast = texture.contrast(footprint);
+  }
   if (material.overlay >= 0) {
     // Turned, so that the two do not repeat together.
     constexpr float kCos = 0.8F;
     constexpr float kSin = 0.6F;
     const auto overlay = static_cast<std::size_t>(material.overlay);
     surface.albedo *=
-        scene_->textures[overlay].sample(kCos * texture_u - kSin * texture_v,
-                                         kSin * texture_u + kCos * texture_v, footprint) *
+        scene_->textures[overlay].sample_quickly(kCos * texture_u - kSin * texture_v,
+                                                 kSin * texture_u + kCos * texture_v, footprint) *
         overlay_scale_[overlay];
-    surface.contrast += scene_->textures[overlay].contrast(footprint);
+    if (look.contrast) {
+      surface.contrast += scene_->textures[overlay].contrast(footprint);
+    }
   }
 }
 
@@ -136,7 +142,7 @@ Surface Shader::surface(const RayPacket& packet, std::size_t lane, const Look& l
     surface.normal = -surface.normal;
   }
   surface.cosine = std::abs(towards);
-  const std::size_t primitive = packet.hit.primID[lane];
+  const std::size_t primitive = RayScene::primitive(packet, lane);
   const auto use = [&](int material) {
     surface.material = &scene_->materials[static_cast<std::size_t>(material)];
     surface.albedo = surface.material->albedo;
@@ -153,7 +159,12 @@ Surface Shader::surface(const RayPacket& packet, std::size_t lane, const Look& l
             scene_->textures[static_cast<std::size_t>(surface.material->texture)].mean();
       }
       const auto& [start, end] = lighting_->around_capsule(primitive);
-      const float along = std::clamp(packet.hit.u[lane], 0.0F, 1.0F);
+      const Capsule& capsule = scene_->capsules[primitive];
+      const Vector3f axis = capsule.end - capsule.start;
+      const float along = std::clamp(
+          (surface.point - capsule.start).dot(axis) / std::max(axis.squaredNorm(), kShortest_m2),
+          0.0F, 1.0F);
+      surface.normal = (surface.point - capsule.start - along * axis).normalized();
       surface.irradiance =
           start.at(surface.normal) * (1.0F - along) + end.at(surface.normal) * along;
       break;
@@ -227,9 +238,9 @@ void Shader::add_mirrors(const std::array<Surface, kPacket>& surfaces, const Ray
     if (valid[i] == 0) {
       continue;
     }
-    const Surface seen =
-        surface(mirrored, i,
-                {.footprint_per_t = 2.0F * look.footprint_per_t, .spread = look.spread, .key = 0});
+    const Surface seen = surface(
+        mirrored, i,
+        {.footprint_per_t = 2.0F * look.footprint_per_t, .spread = look.spread, .quickly = true});
     Rgb light =
         seen.material == nullptr ? lighting_->sky(direction_of(mirrored, i)) : diffuse(seen);
     const float share = mirror_reflectance(surfaces[i]);

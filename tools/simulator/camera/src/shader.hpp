@@ -20,7 +20,7 @@ struct Surface {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< towards the viewer
   float cosine = 1;                                   ///< of the angle between normal and ray
-  float contrast = 0;                                 ///< Texture::contrast() at the footprint
+  float contrast = 0;                                 ///< Texture::contrast(), if looked for
 };
 
 /// Light that comes back along rays. Moving the people is for one thread; all else is const and
@@ -38,6 +38,8 @@ class Shader {
         0;             ///< length on a surface that faces the camera, a unit of the ray's parameter
     float spread = 1;  ///< rays a pixel: how much finer each looks across a slanted surface
     std::uint64_t key = 0;  ///< of the mirrors' roughness
+    bool quickly = false;   ///< coarser textures, for mirror images
+    bool contrast = false;  ///< Surface::contrast is wanted
   };
   /// Luminance [cd/m^2] seen by each valid lane of a traced packet.
   void shade(const std::array<int, kPacket>& valid, const RayPacket& packet, const Look& look,

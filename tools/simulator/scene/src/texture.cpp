@@ -15,7 +15,6 @@ namespace {
 
 constexpr float kLargestCode = 255.0F;
 constexpr unsigned kByte = 8;
-constexpr std::uint32_t kMask = 0xff;
 constexpr std::size_t kContrastOctaves = 3;
 
 std::vector<Rgb> halved(const std::vector<Rgb>& pixels, std::size_t side) {
@@ -43,6 +42,12 @@ float luminance_variance(const std::vector<Rgb>& pixels) {
   const double count = static_cast<double>(pixels.size());
   const double mean = sum / count;
   return static_cast<float>(std::max(0.0, squares / count - mean * mean));
+}
+
+/// The four bytes of a texel as numbers, the lowest first.
+Rgb decode(std::uint32_t texel) noexcept {
+  using Bytes = std::uint8_t __attribute__((vector_size(4)));
+  return __builtin_convertvector(std::bit_cast<Bytes>(texel), Rgb);
 }
 
 int to_cell(float coordinate) noexcept {
@@ -89,21 +94,6 @@ Texture::Texture(const std::vector<Rgb>& pixels, int side, float length_m, Repea
   }
 }
 
-Rgb Texture::texel(const Level& level, int x, int y) const noexcept {
-  if (repeat_ == Repeat::kClamp) {
-    x = std::clamp(x, 0, level.side - 1);
-    y = std::clamp(y, 0, level.side - 1);
-  } else {
-    x &= level.side - 1;
-    y &= level.side - 1;
-  }
-  const std::uint32_t code =
-      level.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.side) +
-                   static_cast<std::size_t>(x)];
-  return Rgb{static_cast<float>(code & kMask), static_cast<float>((code >> kByte) & kMask),
-             static_cast<float>((code >> (2 * kByte)) & kMask), 0.0F};
-}
-
 Rgb Texture::bilinear(std::size_t index, float u, float v) const noexcept {
   const Level& level = levels_[index];
   const float side = static_cast<float>(level.side);
@@ -113,9 +103,18 @@ Rgb Texture::bilinear(std::size_t index, float u, float v) const noexcept {
   const int y0 = to_cell(y);
   const float fx = x - static_cast<float>(x0);
   const float fy = y - static_cast<float>(y0);
-  const Rgb top = texel(level, x0, y0) * (1.0F - fx) + texel(level, x0 + 1, y0) * fx;
-  const Rgb bottom = texel(level, x0, y0 + 1) * (1.0F - fx) + texel(level, x0 + 1, y0 + 1) * fx;
-  return top * (1.0F - fy) + bottom * fy;
+  const int last = level.side - 1;
+  const auto wrap = [&](int cell) {
+    return static_cast<std::size_t>(repeat_ == Repeat::kClamp ? std::clamp(cell, 0, last)
+                                                              : cell & last);
+  };
+  const auto row_length = static_cast<std::size_t>(level.side);
+  const std::uint32_t* top = level.texels.data() + wrap(y0) * row_length;
+  const std::uint32_t* bottom = level.texels.data() + wrap(y0 + 1) * row_length;
+  const std::size_t left = wrap(x0);
+  const std::size_t right = wrap(x0 + 1);
+  return (decode(top[left]) * (1.0F - fx) + decode(top[right]) * fx) * (1.0F - fy) +
+         (decode(bottom[left]) * (1.0F - fx) + decode(bottom[right]) * fx) * fy;
 }
 
 float Texture::level_of(float footprint_m) const noexcept {
@@ -148,6 +147,13 @@ void Texture::turn(float& u, float& v) const noexcept {
     u = 1.0F - u;
     v = 1.0F - v;
   }
+}
+
+Rgb Texture::sample_quickly(float u_m, float v_m, float footprint_m) const noexcept {
+  float u = u_m * inverse_length_;
+  float v = 1.0F - v_m * inverse_length_;
+  turn(u, v);
+  return bilinear(static_cast<std::size_t>(level_of(footprint_m) + 0.5F), u, v) * unit_;
 }
 
 Rgb Texture::sample(float u_m, float v_m, float footprint_m) const noexcept {

@@ -41,6 +41,10 @@ class Texture {
   /// Bilinear in the two levels around that size.
   [[nodiscard]] Rgb sample(float u_m, float v_m, float footprint_m) const noexcept;
 
+  /// The same from the nearest level alone: for faint overlays and for mirror images, where steps
+  /// between levels do not show.
+  [[nodiscard]] Rgb sample_quickly(float u_m, float v_m, float footprint_m) const noexcept;
+
   /// Standard deviation of the luminance over its mean, of the structure between `footprint_m` and
   /// 8 times that size: what a window of about 8 x 8 pixels sees of the texture.
   [[nodiscard]] float contrast(float footprint_m) const noexcept;
@@ -51,7 +55,6 @@ class Texture {
     std::vector<std::uint32_t> texels;  ///< 8 bits each of r, g, b in units of unit_
   };
 
-  [[nodiscard]] Rgb texel(const Level& level, int x, int y) const noexcept;
   [[nodiscard]] Rgb bilinear(std::size_t level, float u, float v) const noexcept;
   [[nodiscard]] float level_of(float footprint_m) const noexcept;
   void turn(float& u, float& v) const noexcept;

@@ -1,0 +1,231 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iostream>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/scene.hpp"
+
+#include "camera_rig.hpp"
+
+// What the simulated camera says, against the geometry that it says it of.
+namespace geoflow::simulator::tests {
+namespace {
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Bilinear in inverse depth, which is linear over a plane's image; 0 beside steps and at the
+/// border.
+double inverse_depth_at(const Rendered& rendered, double x, double y) {
+  constexpr double kStep = 0.05;
+  const int x0 = static_cast<int>(std::floor(x));
+  const int y0 = static_cast<int>(std::floor(y));
+  const ImageShape& shape = rendered.color.shape();
+  if (x0 < 0 || y0 < 0 || x0 + 1 >= shape.width || y0 + 1 >= shape.height) {
+    return 0;
+  }
+  std::array<double, 4> near{};
+  for (int i = 0; i < 4; ++i) {
+    const double depth = truth_m(rendered, x0 + i % 2, y0 + i / 2);
+    near.at(static_cast<std::size_t>(i)) = depth > 0 ? 1.0 / depth : 0.0;
+  }
+  const auto [low, high] = std::ranges::minmax(near);
+  if (low <= 0 || high - low > kStep * high) {
+    return 0;
+  }
+  const double fx = x - x0;
+  const double fy = y - y0;
+  return (near[0] * (1 - fx) + near[1] * fx) * (1 - fy) + (near[2] * (1 - fx) + near[3] * fx) * fy;
+}
+
+double blue_at(const Rendered& rendered, double x, double y) {
+  const int x0 = static_cast<int>(std::floor(x));
+  const int y0 = static_cast<int>(std::floor(y));
+  const double fx = x - x0;
+  const double fy = y - y0;
+  return (blue(rendered, x0, y0) * (1 - fx) + blue(rendered, x0 + 1, y0) * fx) * (1 - fy) +
+         (blue(rendered, x0, y0 + 1) * (1 - fx) + blue(rendered, x0 + 1, y0 + 1) * fx) * fy;
+}
+
+/// How much true depth changes over an infrared pixel, which is 1.6 of colour: registered depth is
+/// that of a rectangle.
+double slope_m(const Rendered& rendered, int x, int y) {
+  constexpr double kColorPixels = 608.8 / 383.5;
+  const ImageShape& shape = rendered.color.shape();
+  const int x1 = std::min(x + 1, shape.width - 1);
+  const int y1 = std::min(y + 1, shape.height - 1);
+  return kColorPixels * (std::abs(truth_m(rendered, x1, y) - truth_m(rendered, x1 - 1, y)) +
+                         std::abs(truth_m(rendered, x, y1) - truth_m(rendered, x, y1 - 1)));
+}
+
+/// Differences after every pixel of one frame is moved to another by the true poses.
+struct WarpErrors {
+  std::vector<double> truth_m;
+  std::vector<double> measured_m;
+  std::vector<double>
+      beyond_pixel_m;  ///< of measured, less what depth changes over one infrared pixel
+  std::vector<double> brightness_ratio;
+};
+
+WarpErrors warp(const Rendered& first, const Rendered& second, const SE3& T_second_first,
+                const CameraIntrinsics& k) {
+  constexpr double kFar_m = 4.0;
+  WarpErrors errors;
+  for (int y = 0; y < k.height; y += 3) {
+    for (int x = 0; x < k.width; x += 3) {
+      const Vector3d direction{(x - k.cx) / k.fx, (y - k.cy) / k.fy, 1.0};
+      const auto moved = [&](double depth) {
+        return Vector3d{T_second_first * Vector3d{depth * direction}};
+      };
+      const double true_depth = truth_m(first, x, y);
+      const Vector3d p = moved(true_depth);
+      if (true_depth <= 0 || true_depth > kFar_m || p.z() <= 0) {
+        continue;
+      }
+      const Vector2d pixel{k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
+      const double inverse = inverse_depth_at(second, pixel.x(), pixel.y());
+      // A surface that the second view does not see is no disagreement.
+      if (inverse <= 0 || std::abs(1.0 / inverse - p.z()) > 0.1) {
+        continue;
+      }
+      errors.truth_m.push_back(std::abs(1.0 / inverse - p.z()));
+      errors.brightness_ratio.push_back(blue_at(second, pixel.x(), pixel.y()) /
+                                        std::max(1.0, blue(first, x, y)));
+      const double measured = 1e-3 * depth_mm(first, x, y);
+      if (measured > 0) {
+        const Vector3d q = moved(measured);
+        const double there =
+            inverse_depth_at(second, k.fx * q.x() / q.z() + k.cx, k.fy * q.y() / q.z() + k.cy);
+        if (there > 0) {
+          const double error_m = std::abs(1.0 / there - q.z());
+          errors.measured_m.push_back(error_m);
+          errors.beyond_pixel_m.push_back(std::max(0.0, error_m - slope_m(first, x, y)));
+        }
+      }
+    }
+  }
+  return errors;
+}
+
+TEST(CameraTruth, AFrameWarpedByTheTruePosesIsTheTenthAfterIt) {
+  const Scene scene = make_scene("office", 2, {}).value();
+  CameraOptions options = exact_options();
+  options.readout_s = 0;
+  options.exposure_min_s = options.exposure_max_s = 1e-4;
+  options.gain_max = 256;
+  options.subexposures = 16;
+  const auto camera = CameraSimulator::create(scene, options).value();
+  const Vector2d start = scene.path()[0];
+  const Vector2d heading = (scene.path()[1] - start).normalized();
+  const double yaw_rad = std::atan2(heading.y(), heading.x());
+  const auto pose = [&](double t_s) {
+    const Vector2d at = start + 0.8 * t_s * heading;
+    return looking(at.x(), at.y(), yaw_rad + 0.1 * std::sin(3.0 * t_s),
+                   0.1 + 0.03 * std::sin(17.0 * t_s));
+  };
+  constexpr double kLater_s = 10.0 / 30.0;
+  const Rendered first = camera->render(1.0, 30, pose);
+  const Rendered second = camera->render(1.0 + kLater_s, 40, pose);
+  const SE3 T_second_first =
+      pose(1.0 + kLater_s).inverse() * pose(1.0);  // frames: two moments of one camera
+  const WarpErrors errors = warp(first, second, T_second_first, camera->intrinsics());
+  ASSERT_GT(errors.truth_m.size(), 8000U);
+  const double truth_mm = 1e3 * median(errors.truth_m);
+  const double measured_mm = 1e3 * median(errors.measured_m);
+  const double exposure = median(errors.brightness_ratio);
+  std::vector<double> brightness;
+  for (const double ratio : errors.brightness_ratio) {
+    brightness.push_back(std::abs(ratio / exposure - 1.0));
+  }
+  std::cout << "warped over 10 frames: true depth " << truth_mm << " mm, registered depth "
+            << measured_mm << " mm, brightness " << 100 * median(brightness) << " %\n";
+  EXPECT_LT(truth_mm, 0.5);
+  std::sort(errors.beyond_pixel_m.begin(), errors.beyond_pixel_m.end());
+  const double beyond_mm = 1e3 * errors.beyond_pixel_m[errors.beyond_pixel_m.size() * 3 / 4];
+  std::cout << "registered depth beyond what one infrared pixel spans, upper quartile: "
+            << beyond_mm << " mm\n";
+  EXPECT_LT(beyond_mm, 2.0);
+  EXPECT_LT(median(brightness), 0.04);
+}
+
+/// Measured less true depth of a wall at `distance_m` in the middle of several frames.
+struct WallNoise {
+  double deviation_m = 0;
+  double near_correlation = 0;  ///< of pixels one correlation length of the model apart in a row
+  double far_correlation = 0;   ///< of pixels three times as far apart
+};
+
+WallNoise measure_wall(float distance_m, const CameraOptions& options) {
+  constexpr int kFrames = 6;
+  constexpr int kNear_px = 13;  // 8 px of the infrared camera
+  Scene scene = daylight_scene();
+  add_wall(scene, distance_m, -60, 60, 0.35F);
+  const auto camera = CameraSimulator::create(scene, options).value();
+  double squares = 0;
+  double near = 0;
+  double far = 0;
+  int count = 0;
+  for (std::uint64_t frame = 0; frame < kFrames; ++frame) {
+    const Rendered rendered = camera->render(0, frame, [](double) { return looking(0, 0, 0); });
+    const auto error = [&](int x, int y) {
+      return 1e-3 * depth_mm(rendered, x, y) - truth_m(rendered, x, y);
+    };
+    for (int y = 40; y < 440; y += 2) {
+      for (int x = 120; x < 520; x += 2, ++count) {
+        squares += error(x, y) * error(x, y);
+        near += error(x, y) * error(x + kNear_px, y);
+        far += error(x, y) * error(x + 3 * kNear_px, y);
+      }
+    }
+  }
+  return {.deviation_m = std::sqrt(squares / count),
+          .near_correlation = near / squares,
+          .far_correlation = far / squares};
+}
+
+TEST(CameraTruth, DepthNoiseFollowsTheStereoModel) {
+  CameraOptions options;
+  options.depth_errors = false;
+  const double focal_baseline =
+      d435i_ir_intrinsics(options.width, options.height).fx * kD435iBaseline_m;
+  double sum_xy = 0;
+  double sum_xx = 0;
+  for (const float distance_m : {0.8F, 1.2F, 1.6F, 2.0F, 3.0F, 4.0F}) {
+    const auto z = static_cast<double>(distance_m);
+    const WallNoise noise = measure_wall(distance_m, options);
+    // Of a wall of the model's reference reflectance, seen squarely: a signal of 1 / z^2; and the
+    // steps of 1/32 px and 1 mm.
+    const double spread_px = options.depth_subpixel_px * std::hypot(1.0, 0.06 * z * z);
+    const double disparity_px = std::hypot(spread_px, 1.0 / 32.0 / std::sqrt(12.0));
+    const double expected_m =
+        std::hypot(disparity_px * z * z / focal_baseline, 1e-3 / std::sqrt(12.0));
+    std::cout << "wall at " << z << " m: deviation " << 1e3 * noise.deviation_m << " mm (model "
+              << 1e3 * expected_m << "), correlation " << noise.near_correlation << ", "
+              << noise.far_correlation << "\n";
+    EXPECT_NEAR(noise.deviation_m / expected_m, 1.0, 0.1) << z;
+    if (z > 1.5) {
+      EXPECT_NEAR(noise.near_correlation, 0.5, 0.15) << z;
+      EXPECT_NEAR(noise.far_correlation, 0.0, 0.1) << z;
+    }
+    if (z <= 2.0) {
+      sum_xy += z * z * noise.deviation_m;
+      sum_xx += z * z * z * z;
+    }
+  }
+  const double subpixel_px = sum_xy / sum_xx * focal_baseline;
+  std::cout << "regressed on z^2 up to 2 m: " << subpixel_px << " px\n";
+  EXPECT_NEAR(subpixel_px, options.depth_subpixel_px, 0.1 * options.depth_subpixel_px);
+}
+
+}  // namespace
+}  // namespace geoflow::simulator::tests
