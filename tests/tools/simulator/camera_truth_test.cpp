@@ -138,7 +138,7 @@ TEST(CameraTruth, AFrameWarpedByTheTruePosesIsTheTenthAfterIt) {
   const Rendered second = camera->render(1.0 + kLater_s, 40, pose);
   const SE3 T_second_first =
       pose(1.0 + kLater_s).inverse() * pose(1.0);  // frames: two moments of one camera
-  const WarpErrors errors = warp(first, second, T_second_first, camera->intrinsics());
+  WarpErrors errors = warp(first, second, T_second_first, camera->intrinsics());
   ASSERT_GT(errors.truth_m.size(), 8000U);
   const double truth_mm = 1e3 * median(errors.truth_m);
   const double measured_mm = 1e3 * median(errors.measured_m);
