@@ -16,7 +16,7 @@ namespace {
 constexpr Duration kWindow = std::chrono::milliseconds{300};
 /// Fewer samples in a window prove nothing.
 constexpr std::size_t kLeastSamples = 10;
-/// A joint at rest: two steps of 1.9 mrad/s... of a standing Go2's angles [rad].
+/// A joint at rest turns by no more than this within a window [rad].
 constexpr double kJointRange = 0.006;
 /// Beyond the sensor's own noise: what motors and fans shake a standing robot by.
 constexpr double kGyroShake = 0.015;  // [rad/s]
