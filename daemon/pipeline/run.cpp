@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include <malloc.h>
+
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/recording.hpp"
@@ -27,12 +29,22 @@ drivers::RecordingOptions recording_options(const Config& config) {
           .color_as_gray = true};
 }
 
+/// Every frame allocates and frees the same image-sized blocks. By default glibc gives such blocks
+/// back to the kernel, and each frame pays their page faults again.
+void keep_freed_memory() {
+  constexpr int kNeverMapSeparatelyBytes = 1 << 30;
+  constexpr int kKeepBytes = 1 << 28;
+  ::mallopt(M_MMAP_THRESHOLD, kNeverMapSeparatelyBytes);
+  ::mallopt(M_TRIM_THRESHOLD, kKeepBytes);
+}
+
 }  // namespace
 
 Result<Run> open_run(const Config& config) {
   if (config.source.replay.empty()) {
     return fail(ErrorCode::kInvalidArgument, "source.replay: no recording is named (--replay DIR)");
   }
+  keep_freed_memory();
   Run run;
   auto streams = drivers::RecordedStreams::open(recording_options(config));
   if (!streams) {

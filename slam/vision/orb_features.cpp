@@ -5,8 +5,6 @@
 #include <cstddef>
 #include <cstring>
 #include <span>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -15,80 +13,49 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
 
+#include "vision/cell_count.hpp"
+#include "vision/corners.hpp"
+
 namespace geoflow::slam {
 namespace {
-
-constexpr int kCandidates = 3000;  ///< strongest corners over all octaves, before the grid chooses
-constexpr float kScaleFactor = 1.2F;
-constexpr int kOctaves = 4;
-constexpr int kPatchPx = 31;  ///< side of the patch that a descriptor compares pixels in
 
 /// Hamming distances above this are as likely between different places as between views of one (ORB
 /// paper, figure 7).
 constexpr int kMaximumHamming = 64;
 constexpr double kSecondBestRatio = 0.85;
 
-/// Counts what has been taken of each grid cell.
-class CellCount {
+/// The pixels that are further than a radius from all taken ones.
+class FreePixels {
  public:
-  CellCount(const cv::Size& image, int cell_px, int most)
-      : cell_px_{cell_px},
-        most_{most},
-        count_(image.height / cell_px + 1, image.width / cell_px + 1, 0) {}
+  FreePixels(const cv::Size& size, double radius_px)
+      : free_{size, kFree}, radius_px_{static_cast<int>(std::lround(radius_px))} {}
 
-  /// Whether there is room in the cell of a pixel; takes it.
-  bool take(double x, double y) {
-    int& in_cell = count_(static_cast<int>(y) / cell_px_, static_cast<int>(x) / cell_px_);
-    return in_cell < most_ && ++in_cell > 0;
+  [[nodiscard]] bool contains(const Vector2d& pixel) const { return free_(at(pixel)) == kFree; }
+  void take(const Vector2d& pixel) {
+    const cv::Point corner = at(pixel) - cv::Point{radius_px_, radius_px_};
+    const int side = 2 * radius_px_ + 1;
+    free_(cv::Rect{corner, cv::Size{side, side}} & cv::Rect{{0, 0}, free_.size()}).setTo(0);
   }
 
  private:
-  int cell_px_;
-  int most_;
-  cv::Mat1i count_;
-};
-
-/// Keeps the strongest few of each grid cell, strongest first.
-std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> candidates, const cv::Size& image,
-                                 const FeatureConfig& config) {
-  // By place where equally strong, so that the order is one whatever the detector's is.
-  std::sort(candidates.begin(), candidates.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-    return std::tuple{-a.response, a.octave, a.pt.y, a.pt.x} <
-           std::tuple{-b.response, b.octave, b.pt.y, b.pt.x};
-  });
-  CellCount cells{image, config.cell_px, config.described_per_cell};
-  std::erase_if(candidates, [&](const cv::KeyPoint& key_point) {
-    return !cells.take(static_cast<double>(key_point.pt.x), static_cast<double>(key_point.pt.y));
-  });
-  return candidates;
-}
-
-/// Marks the surroundings of taken pixels as not to be used (0); the rest is 255.
-cv::Mat1b free_mask(const cv::Size& size, std::span<const Vector2d> taken, double radius_px) {
-  constexpr unsigned char kFree = 255;
-  cv::Mat1b mask{size, kFree};
-  const int radius = static_cast<int>(std::lround(radius_px));
-  const cv::Rect image{0, 0, size.width, size.height};
-  for (const Vector2d& pixel : taken) {
-    const cv::Point centre{static_cast<int>(std::lround(pixel.x())),
-                           static_cast<int>(std::lround(pixel.y()))};
-    const cv::Rect square{centre.x - radius, centre.y - radius, 2 * radius + 1, 2 * radius + 1};
-    mask(square & image).setTo(0);
+  static constexpr unsigned char kFree = 255;
+  static cv::Point at(const Vector2d& pixel) {
+    return {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
   }
-  return mask;
-}
+
+  cv::Mat1b free_;
+  int radius_px_;
+};
 
 }  // namespace
 
 OrbExtractor::OrbExtractor(const FeatureConfig& config)
     : config_{config},
-      orb_{cv::ORB::create(kCandidates, kScaleFactor, kOctaves, kPatchPx, 0, 2, cv::ORB::FAST_SCORE,
-                           kPatchPx, config.fast_threshold)} {}
+      orb_{cv::ORB::create(0, static_cast<float>(kOctaveScale), kOctaves, 0, 0, 2,
+                           cv::ORB::FAST_SCORE, kPatchPx)} {}
 
 std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& gray) {
-  std::vector<cv::KeyPoint> key_points;
-  orb_->detect(gray, key_points);
-  key_points = spread(std::move(key_points), gray.size(), config_);
+  std::vector<cv::KeyPoint> key_points = detect_corners(gray, config_);
   cv::Mat descriptors;
   orb_->compute(gray, key_points, descriptors);
 
@@ -105,14 +72,16 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& gray) {
 std::vector<OrbFeature> choose_new(std::span<const OrbFeature> features,
                                    std::span<const Vector2d> taken, const cv::Size& image,
                                    const FeatureConfig& config) {
-  const cv::Mat1b mask = free_mask(image, taken, config.mask_radius_px);
+  FreePixels free{image, config.mask_radius_px};
+  for (const Vector2d& pixel : taken) {
+    free.take(pixel);
+  }
   CellCount cells{image, config.cell_px, config.features_per_cell};
   std::vector<OrbFeature> chosen;
   for (const OrbFeature& feature : features) {
-    const int x = static_cast<int>(std::lround(feature.pixel.x()));
-    const int y = static_cast<int>(std::lround(feature.pixel.y()));
-    if (mask(y, x) != 0 && cells.take(feature.pixel.x(), feature.pixel.y())) {
+    if (free.contains(feature.pixel) && cells.take(feature.pixel.x(), feature.pixel.y())) {
       chosen.push_back(feature);
+      free.take(feature.pixel);
     }
   }
   return chosen;

@@ -49,7 +49,8 @@ class OrbExtractor {
 };
 
 /// Those of `features` that are worth tracking beside what is tracked already: at most
-/// features_per_cell in a cell, none within mask_radius_px of the raw pixels in `taken`.
+/// features_per_cell in a cell, none within mask_radius_px of the raw pixels in `taken` or of an
+/// earlier one.
 [[nodiscard]] std::vector<OrbFeature> choose_new(std::span<const OrbFeature> features,
                                                  std::span<const Vector2d> taken,
                                                  const cv::Size& image,

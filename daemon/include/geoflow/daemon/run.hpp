@@ -26,8 +26,8 @@ struct Run {
   timesync::SynchroniserCounters synchroniser;  ///< filled when the run is over
 };
 
-/// Opens the configured source and makes an estimator for its calibration. Errors name file, line
-/// or key.
+/// Opens the configured source and makes an estimator for its calibration; from then on the process
+/// keeps the memory it frees. Errors name file, line or key.
 [[nodiscard]] Result<Run> open_run(const Config& config);
 
 }  // namespace geoflow::daemon

@@ -1,0 +1,115 @@
+#include "map/map_builder.hpp"
+
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/slam/config.hpp"
+
+#include "map/map.hpp"
+#include "odometry/frame.hpp"
+#include "slam/vision/textured_wall.hpp"
+#include "vision/dual_stream_flow.hpp"
+
+/// Keyframes of a textured wall that the camera has no depth of.
+namespace geoflow::slam {
+namespace {
+
+class MapBuilderTest : public testing::Test {
+ protected:
+  /// The frame at a pose, with the features of `previous` followed into it.
+  Frame frame_at(const SE3& T_odom_cam, const Frame* previous = nullptr) const {
+    const FlowConfig flow;
+    Frame frame;
+    frame.T_odom_cam = T_odom_cam;
+    frame.pyramid = std::make_shared<const ImagePyramid>(wall_.seen_from(T_odom_cam),
+                                                         flow.window_px, flow.levels);
+    if (previous != nullptr) {
+      std::vector<FlowSeed> seeds;
+      for (const Feature& feature : previous->features) {
+        seeds.push_back({.previous = feature.raw, .predicted = std::nullopt});
+      }
+      const auto tracks =
+          DualStreamFlow{flow, camera_}.track(*previous->pyramid, *frame.pyramid, seeds);
+      for (std::size_t i = 0; i < tracks.size(); ++i) {
+        if (tracks[i]) {
+          Feature feature = previous->features[i];
+          feature.raw = *tracks[i];
+          feature.ideal = *tracks[i];
+          frame.features.push_back(feature);
+        }
+      }
+    }
+    return frame;
+  }
+
+  TexturedWall wall_{2.0, 11};
+  CameraModel camera_{wall_camera()};
+  MapBuilder builder_{
+      {}, {}, {.camera = wall_camera(), .source = "the test", .serial = {}}, nullptr};
+  Map map_;
+};
+
+TEST_F(MapBuilderTest, FeaturesWithoutDepthBecomePointsOnceTheCameraHasMovedEnough) {
+  Frame a = frame_at(SE3{});
+  builder_.insert(map_, a, Matrix6d::Zero());
+  EXPECT_GT(a.features.size(), 60U);
+  EXPECT_TRUE(map_.points().empty());
+
+  // 1 cm aside is half the least parallax at 2 m.
+  Frame b = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{0.01, 0, 0}}, &a);
+  builder_.insert(map_, b, Matrix6d::Zero());
+  EXPECT_TRUE(map_.points().empty());
+
+  Frame c = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{0.12, 0, 0}}, &b);
+  const KeyframeId third = builder_.insert(map_, c, Matrix6d::Zero());
+  ASSERT_GT(map_.points().size(), 50U);
+  std::size_t near = 0;
+  for (const auto& [id, point] : map_.points()) {
+    EXPECT_EQ(point.observations.size(), 2U);
+    EXPECT_EQ(point.observations.back().keyframe, third);
+    // 0.2 px of each track, over a parallax of 0.06 rad: 4 % of the distance at three sigma.
+    near += std::abs(point.p_odom.z() - 2.0) < 0.08 ? 1U : 0U;
+  }
+  EXPECT_GT(near, map_.points().size() * 95 / 100);
+}
+
+TEST_F(MapBuilderTest, TheAdjustmentSeesEveryKeyframeAndHoldsAtLeastOne) {
+  Frame frame = frame_at(SE3{});
+  KeyframeId newest = builder_.insert(map_, frame, Matrix6d::Zero());
+  for (int i = 1; i <= 3; ++i) {
+    Frame next = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{0.1 * i, 0, 0}}, &frame);
+    newest = builder_.insert(map_, next, Matrix6d::Zero());
+    frame = next;
+  }
+  const auto problem = builder_.task(map_, newest).problem;
+  ASSERT_EQ(problem->keyframes.size(), 4U);
+  EXPECT_TRUE(problem->keyframes.front().fixed);
+  EXPECT_FALSE(problem->keyframes.back().fixed);
+  EXPECT_GT(problem->points.size(), 50U);
+  for (const MappingPoint& point : problem->points) {
+    EXPECT_GE(point.observations.size(), 2U);
+  }
+}
+
+TEST_F(MapBuilderTest, PointsThatAreSeldomWhereTheyShouldBeAreForgotten) {
+  Frame a = frame_at(SE3{});
+  builder_.insert(map_, a, Matrix6d::Zero());
+  Frame b = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{0.12, 0, 0}}, &a);
+  builder_.insert(map_, b, Matrix6d::Zero());
+  ASSERT_GT(map_.points().size(), 2U);
+  const PointId bad = map_.points().begin()->first;
+  const PointId good = map_.points().rbegin()->first;
+  map_.find_point(bad)->expected = map_.find_point(good)->expected = 10;
+  map_.find_point(bad)->found = 4;
+  map_.find_point(good)->found = 6;
+  Frame c = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{0.14, 0, 0}}, &b);
+  builder_.insert(map_, c, Matrix6d::Zero());
+  EXPECT_EQ(map_.find_point(bad), nullptr);
+  EXPECT_NE(map_.find_point(good), nullptr);
+}
+
+}  // namespace
+}  // namespace geoflow::slam
