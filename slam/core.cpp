@@ -10,13 +10,23 @@
 
 #include <Eigen/Cholesky>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/stage.hpp"
 
+#include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
-#include "map/mapping_problem.hpp"
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/tracker.hpp"
@@ -61,7 +71,9 @@ class Core::Impl {
     if (!pending_) {
       return std::nullopt;
     }
-    return builder_.task(map_, *std::exchange(pending_, std::nullopt));
+    const KeyframeId newest = *pending_;
+    pending_.reset();
+    return builder_.task(map_, newest);
   }
 
   void apply(const MappingResult& result) {
@@ -70,7 +82,7 @@ class Core::Impl {
     motion_.move(T_odom1_odom0);
   }
 
-  Trajectory final_trajectory() const {
+  [[nodiscard]] Trajectory final_trajectory() const {
     Trajectory trajectory;
     const SE3 T_cam_base = T_base_cam_.inverse();
     for (const FrameRecord& record : records_) {
@@ -152,7 +164,7 @@ class Core::Impl {
     return estimate;
   }
 
-  PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {
+  [[nodiscard]] PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {
     PoseEstimate estimate;
     estimate.t = packet.t;
     estimate.sequence = packet.sequence;
@@ -172,8 +184,8 @@ class Core::Impl {
     if (result.anchored) {
       drift_.setZero();
     } else {
-      const Matrix6d A_step = (T_odom_cam.inverse() * T_odom_cam_).adjoint();
-      drift_ = A_step * drift_ * A_step.transpose();
+      const Matrix6d by_step = (T_odom_cam.inverse() * T_odom_cam_).adjoint();
+      drift_ = by_step * drift_ * by_step.transpose();
     }
     drift_ += result.covariance;
     T_odom_cam_ = T_odom_cam;
@@ -195,8 +207,8 @@ class Core::Impl {
     return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
   }
 
-  bool needs_keyframe(const SyncedPacket& packet, const TrackingResult& result,
-                      const SE3& T_odom_cam) const {
+  [[nodiscard]] bool needs_keyframe(const SyncedPacket& packet, const TrackingResult& result,
+                                    const SE3& T_odom_cam) const {
     const Keyframe& reference = map_.keyframe(reference_);
     const Vector6d moved = (reference.T_odom_cam.inverse() * T_odom_cam).log();
     const double share = static_cast<double>(result.solution.visual_inliers) /

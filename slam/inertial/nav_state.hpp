@@ -42,7 +42,9 @@ struct ImuBias {
 
   /// (gyro, accel), 6 x 1.
   [[nodiscard]] Vector6d vector() const;
-  [[nodiscard]] static ImuBias from(const Vector6d& v) { return {v.head<3>(), v.tail<3>()}; }
+  [[nodiscard]] static ImuBias from(const Vector6d& v) {
+    return {.gyro_radps = v.head<3>(), .accel_mps2 = v.tail<3>()};
+  }
 };
 
 /// Pose, velocity and biases of the IMU at one instant.

@@ -1,8 +1,8 @@
 #include "map/map.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 namespace geoflow::slam {
 

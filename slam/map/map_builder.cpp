@@ -3,21 +3,32 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <memory>
+#include <optional>
+#include <ranges>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
 #include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/stage.hpp"
 
+#include "cloud/gicp.hpp"
 #include "cloud/pixel_depth.hpp"
+#include "map/map.hpp"
+#include "map/mapping_problem.hpp"
 #include "map/overlap.hpp"
 #include "map/point_search.hpp"
+#include "odometry/frame.hpp"
+#include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 
 namespace geoflow::slam {
@@ -79,7 +90,10 @@ void MapBuilder::cull(Map& map, const Frame& frame) const {
   constexpr std::uint32_t kEnoughChances = 8;
   constexpr double kLeastFound = 0.5;
   for (const Feature& feature : frame.features) {
-    const MapPoint* point = feature.point ? map.find_point(*feature.point) : nullptr;
+    if (!feature.point) {
+      continue;
+    }
+    const MapPoint* point = map.find_point(*feature.point);
     if (point != nullptr && point->expected >= kEnoughChances &&
         point->found < kLeastFound * point->expected) {
       map.remove_point(*feature.point);
@@ -93,7 +107,8 @@ void MapBuilder::observe_features(Map& map, KeyframeId keyframe, Frame& frame) c
       feature.point.reset();
     }
     if (feature.point) {
-      map.observe(*feature.point, {keyframe, feature.ideal, feature.depth_m});
+      map.observe(*feature.point,
+                  {.keyframe = keyframe, .pixel = feature.ideal, .depth_m = feature.depth_m});
     } else {
       triangulate(map, keyframe, feature);
     }
@@ -114,22 +129,26 @@ void MapBuilder::triangulate(Map& map, KeyframeId keyframe, Feature& feature) co
   }
   if (!p_odom) {
     if (!feature.anchor) {
-      feature.anchor = Feature::Anchor{keyframe, feature.ideal};
+      feature.anchor = Feature::Anchor{.keyframe = keyframe, .pixel = feature.ideal};
     }
     return;
   }
   feature.point =
       map.add_point({.p_odom = *p_odom, .descriptor = feature.descriptor, .observations = {}});
   if (feature.anchor) {
-    map.observe(*feature.point, {feature.anchor->keyframe, feature.anchor->pixel, 0});
+    map.observe(
+        *feature.point,
+        {.keyframe = feature.anchor->keyframe, .pixel = feature.anchor->pixel, .depth_m = 0});
   }
-  map.observe(*feature.point, {keyframe, feature.ideal, feature.depth_m});
+  map.observe(*feature.point,
+              {.keyframe = keyframe, .pixel = feature.ideal, .depth_m = feature.depth_m});
 }
 
 void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   constexpr double kSearchRadiusPx = 8;
   const StageScope scope{observer_, Stage::kFeatures};
   std::vector<Vector2d> taken;
+  taken.reserve(frame.features.size());
   for (const Feature& feature : frame.features) {
     taken.push_back(feature.raw);
   }
@@ -145,8 +164,9 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   const auto points = find_points(map, frame, added, kSearchRadiusPx, camera_);
   for (std::size_t j = 0; j < added.size(); ++j) {
     added[j].point = points[j];
-    if (points[j]) {
-      map.observe(*points[j], {keyframe, added[j].ideal, added[j].depth_m});
+    if (const std::optional<PointId>& point = points[j]) {
+      map.observe(*point,
+                  {.keyframe = keyframe, .pixel = added[j].ideal, .depth_m = added[j].depth_m});
     } else {
       triangulate(map, keyframe, added[j]);
     }
@@ -199,10 +219,11 @@ std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<K
     connect(from, to);
   }
   std::vector<std::pair<std::size_t, KeyframeId>> by_connection;
+  by_connection.reserve(connection.size());
   for (const auto& [id, strength] : connection) {
     by_connection.emplace_back(strength, id);
   }
-  std::sort(by_connection.rbegin(), by_connection.rend());
+  std::ranges::sort(std::ranges::reverse_view(by_connection));
   by_connection.resize(
       std::min(by_connection.size(), static_cast<std::size_t>(config_.mapping.fixed)));
   std::set<KeyframeId> held;
@@ -241,10 +262,9 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
   }
   for (const PointId id : points) {
     const MapPoint& point = *map.find_point(id);
-    MappingPoint snapshot{id, point.p_odom, {}};
-    std::copy_if(point.observations.begin(), point.observations.end(),
-                 std::back_inserter(snapshot.observations),
-                 [&](const Observation& o) { return inside(o.keyframe); });
+    MappingPoint snapshot{.id = id, .p_odom = point.p_odom, .observations = {}};
+    std::ranges::copy_if(point.observations, std::back_inserter(snapshot.observations),
+                         [&](const Observation& o) { return inside(o.keyframe); });
     if (snapshot.observations.size() > 1) {
       problem->points.push_back(std::move(snapshot));
     }

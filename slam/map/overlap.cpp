@@ -44,15 +44,15 @@ DepthAgreement agreement(const std::vector<Eigen::Vector3f>& samples, const Dept
     if (!cell) {
       continue;
     }
-    const auto index = static_cast<std::size_t>(cell->y() * target.grid().columns() + cell->x());
-    const Surfel& surfel = target.surfels()[index];
+    const int index = cell->y() * target.grid().columns() + cell->x();
+    const Surfel& surfel = target.surfels()[static_cast<std::size_t>(index)];
     if (surfel.valid()) {
       ++seen;
       agreeing += std::abs(surfel.point.z() - p.z()) < kDepthTolerance * p.z() ? 1U : 0U;
     }
   }
   const double all = std::max(1.0, static_cast<double>(samples.size()));
-  return {static_cast<double>(seen) / all, static_cast<double>(agreeing) / all};
+  return {.seen = static_cast<double>(seen) / all, .agreeing = static_cast<double>(agreeing) / all};
 }
 
 }  // namespace
@@ -77,7 +77,7 @@ std::vector<OverlappingKeyframe> overlapping_keyframes(const Map& map, const Dep
       found.push_back({id, share});
     }
   }
-  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+  std::ranges::sort(found, [](const auto& a, const auto& b) {
     return a.overlap > b.overlap || (a.overlap == b.overlap && a.id < b.id);
   });
   return found;
@@ -94,7 +94,7 @@ std::vector<KeyframeId> registration_targets(const std::vector<OverlappingKeyfra
   for (auto it = overlapping.begin() + 1; it != overlapping.end(); ++it) {
     rest.push_back(it->id);
   }
-  std::sort(rest.begin(), rest.end());
+  std::ranges::sort(rest);
   rest.resize(std::min(rest.size(), count - 1));
   targets.insert(targets.end(), rest.begin(), rest.end());
   return targets;

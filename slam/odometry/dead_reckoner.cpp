@@ -5,11 +5,14 @@
 #include <optional>
 #include <vector>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/slam/config.hpp"
 
+#include "legs/leg_config.hpp"
 #include "legs/leg_odometry.hpp"
 
 namespace geoflow::slam {
@@ -22,9 +25,9 @@ constexpr double kTwistScale = 0.03;
 
 constexpr double kUnknownM = 1;  ///< of a way that is not known
 
-LegConfig leg_config(const Calibration& calibration) {
+LegConfig leg_config(const Calibration& calibration, const SE3& T_cam_imu) {
   LegConfig config;
-  config.T_base_imu = calibration.T_base_cam.value_or(SE3{}) * *calibration.T_cam_imu;
+  config.T_base_imu = calibration.T_base_cam.value_or(SE3{}) * T_cam_imu;
   config.imu_noise = calibration.imu_noise;
   return config;
 }
@@ -41,14 +44,14 @@ DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibrat
       imu_noise_{calibration.imu_noise},
       base_known_{calibration.T_base_cam.has_value()} {
   if (switches.imu && calibration.T_cam_imu) {
-    odometry_.emplace(leg_config(calibration));
+    odometry_.emplace(leg_config(calibration, *calibration.T_cam_imu));
   }
 }
 
 std::optional<ReckonedMotion> DeadReckoner::add(const SyncedPacket& packet) {
   std::optional<ReckonedMotion> motion;
   if (odometry_) {
-    motion = by_inertia(packet);
+    motion = by_inertia(*odometry_, packet);
   }
   if ((!motion || !motion->legs) && switches_.legs && base_known_) {
     if (const auto twist = by_twist(packet)) {
@@ -63,17 +66,20 @@ ReckonedMotion DeadReckoner::of_camera(const SE3& T_base0_base1, const Matrix6d&
                                        bool legs) const {
   const SE3 T_cam_base = T_base_cam_.inverse();
   const Matrix6d A = T_cam_base.adjoint();
-  return {T_cam_base * T_base0_base1 * T_base_cam_, A * covariance * A.transpose(), legs};
+  return {.T_cam0_cam1 = T_cam_base * T_base0_base1 * T_base_cam_,
+          .covariance = A * covariance * A.transpose(),
+          .legs = legs};
 }
 
-std::optional<ReckonedMotion> DeadReckoner::by_inertia(const SyncedPacket& packet) {
+std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
+                                                       const SyncedPacket& packet) {
   const bool legs = switches_.legs && base_known_;
   const auto before = last_;
   MotionSamples samples{.imu = packet.imu, .legs = {}, .body_velocity = {}};
   if (legs) {
     samples.legs = packet.legs;
   }
-  last_ = odometry_->add(samples, packet.t);
+  last_ = odometry.add(samples, packet.t);
   if (!before || !last_) {
     return std::nullopt;
   }

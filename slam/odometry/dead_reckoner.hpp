@@ -32,7 +32,8 @@ class DeadReckoner {
   std::optional<ReckonedMotion> add(const SyncedPacket& packet);
 
  private:
-  [[nodiscard]] std::optional<ReckonedMotion> by_inertia(const SyncedPacket& packet);
+  [[nodiscard]] std::optional<ReckonedMotion> by_inertia(LegOdometry& odometry,
+                                                         const SyncedPacket& packet);
   [[nodiscard]] std::optional<ReckonedMotion> by_twist(const SyncedPacket& packet) const;
   /// A motion of the base with the covariance of its right perturbation, as one of the camera.
   [[nodiscard]] ReckonedMotion of_camera(const SE3& T_base0_base1, const Matrix6d& covariance,

@@ -9,6 +9,9 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "odometry/dead_reckoner.hpp"
+#include "odometry/pose_optimiser.hpp"
+
 namespace geoflow::slam {
 namespace {
 
@@ -77,7 +80,7 @@ PosePrior MotionModel::predict(HostTime t, const std::optional<ReckonedMotion>& 
     covariance += A * covariance_ * A.transpose();
   }
   const SE3& T_odom_cam0 = T_odom_cam_;
-  return {T_odom_cam0 * T_cam0_cam1, covariance.inverse()};
+  return {.T_odom_cam = T_odom_cam0 * T_cam0_cam1, .information = covariance.inverse()};
 }
 
 void MotionModel::move(const SE3& T_odom1_odom0) {

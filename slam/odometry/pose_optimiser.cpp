@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -83,10 +84,10 @@ void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam
     if (match.depth_m > 0) {
       const double sigma_m = mapping_.depth_sigma_at_1m * match.depth_m * match.depth_m;
       const double rz = (p_cam.z() - match.depth_m) / sigma_m;
-      const Eigen::Matrix<double, 1, 6> Jz = J_point.row(2) / sigma_m;
+      const Eigen::Matrix<double, 1, 6> J_z = J_point.row(2) / sigma_m;
       const double weight_z = weight * cauchy_weight(rz * rz);
-      system.visual += weight_z * Jz.transpose() * Jz;
-      system.gradient += weight_z * Jz.transpose() * rz;
+      system.visual += weight_z * J_z.transpose() * J_z;
+      system.gradient += weight_z * J_z.transpose() * rz;
     }
   }
 }

@@ -24,7 +24,7 @@ struct VisualMatch {
 
 /// A keyframe's depth, in place.
 struct DepthTarget {
-  const DepthCloud* cloud;
+  const DepthCloud* cloud = nullptr;
   SE3 T_odom_target;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,12 +11,27 @@
 
 #include <Eigen/LU>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/slam/stage.hpp"
 
+#include "cloud/cell_grid.hpp"
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
 #include "cloud/gicp_search.hpp"
 #include "cloud/pixel_depth.hpp"
+#include "map/map.hpp"
 #include "map/overlap.hpp"
+#include "odometry/frame.hpp"
+#include "odometry/motion_model.hpp"
+#include "odometry/pose_optimiser.hpp"
+#include "place/relocaliser.hpp"
+#include "vision/dual_stream_flow.hpp"
 #include "vision/image_pyramid.hpp"
+#include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 #include "vision/pnp.hpp"
 
@@ -81,8 +97,8 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
   }
   const auto tracks = flow_.track(*previous_.pyramid, *current_.pyramid, seeds);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (tracks[i]) {
-      Feature feature = feature_at(*tracks[i]);
+    if (const std::optional<Vector2d>& track = tracks[i]) {
+      Feature feature = feature_at(*track);
       feature.point = previous_.features[i].point;
       feature.anchor = previous_.features[i].anchor;
       feature.descriptor = previous_.features[i].descriptor;
@@ -97,7 +113,10 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
   std::vector<PointId> points;
   std::vector<ExpectedFeature> expected;
   for (const Feature& feature : previous_.features) {
-    const MapPoint* point = feature.point ? map.find_point(*feature.point) : nullptr;
+    if (!feature.point) {
+      continue;
+    }
+    const MapPoint* point = map.find_point(*feature.point);
     const Vector3d p_cam = point == nullptr ? Vector3d::Zero() : T_cam_odom * point->p_odom;
     if (p_cam.z() > 0) {
       points.push_back(*feature.point);
@@ -164,15 +183,16 @@ Tracker::InitialPose Tracker::initial_pose(const InitialPose& predicted,
       .least_inlier_share = 0.5,
       .iterations = 100};
   if (const std::optional<PnpSolution> pose = solve_pnp(matches, camera_, config_.pose, effort)) {
-    return {pose->T_odom_cam, PoseSource::kPnp, true};
+    return {.T_odom_cam = pose->T_odom_cam, .source = PoseSource::kPnp, .sure = true};
   }
   if (config_.switches.gicp && current_.cloud && previous_.cloud) {
     const SE3& T_odom_target = previous_.T_odom_cam;
     const RegistrationResult found = register_from_afar(
         *current_.cloud, *previous_.cloud, T_odom_target.inverse() * predicted.T_odom_cam, gicp_);
     if (found.converged) {
-      return {T_odom_target * found.T_target_source, PoseSource::kGicp,
-              found.overlap > kGoodOverlap};
+      return {.T_odom_cam = T_odom_target * found.T_target_source,
+              .source = PoseSource::kGicp,
+              .sure = found.overlap > kGoodOverlap};
     }
   }
   return predicted;
@@ -183,9 +203,11 @@ void Tracker::keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_
   std::vector<bool> keep(current_.features.size(), true);
   for (std::size_t k = 0; k < feature_of_match.size(); ++k) {
     const std::size_t i = feature_of_match[k];
-    MapPoint& point = *map.find_point(*current_.features[i].point);
-    ++point.expected;
-    point.found += solution.inlier[k] ? 1U : 0U;
+    if (const std::optional<PointId>& id = current_.features[i].point) {
+      MapPoint& point = *map.find_point(*id);
+      ++point.expected;
+      point.found += solution.inlier[k] ? 1U : 0U;
+    }
     keep[i] = solution.inlier[k];
   }
   std::vector<Feature> kept;
@@ -215,7 +237,7 @@ Tracker::InitialPose Tracker::first_guess(const Map& map, const InitialPose& pre
   if (!held || !initial.sure) {
     if (const std::optional<SE3> pose = relocate(map, predicted.T_odom_cam)) {
       current_.anchored = true;
-      return {*pose, PoseSource::kPnp, true};
+      return {.T_odom_cam = *pose, .source = PoseSource::kPnp, .sure = true};
     }
   }
   if (!current_.anchored) {
@@ -257,7 +279,8 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
 TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predicted_by) {
   TrackingResult result;
   const bool blind = is_blind(prior);
-  const InitialPose initial = first_guess(map, {prior.T_odom_cam, predicted_by, false}, blind);
+  const InitialPose initial = first_guess(
+      map, {.T_odom_cam = prior.T_odom_cam, .source = predicted_by, .sure = false}, blind);
   result.source = initial.source;
   result.sure = initial.sure;
   result.anchored = current_.anchored;

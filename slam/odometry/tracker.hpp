@@ -54,8 +54,8 @@ class Tracker {
  private:
   struct InitialPose {
     SE3 T_odom_cam;
-    PoseSource source;
-    bool sure;  ///< checked by enough of what it was made from
+    PoseSource source{};
+    bool sure = false;  ///< checked by enough of what it was made from
   };
   void follow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);

@@ -60,7 +60,7 @@ SE3 from_block(const double* block) noexcept {
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
   const PoseBlock block = to_block(from_block(x) * SE3::exp(Eigen::Map<const Vector6d>{delta}));
-  std::copy(block.begin(), block.end(), x_plus_delta);
+  std::ranges::copy(block, x_plus_delta);
   return true;
 }
 

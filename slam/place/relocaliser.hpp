@@ -47,7 +47,7 @@ class Relocaliser {
  private:
   struct Hypothesis {
     SE3 T_odom_cam;
-    bool certain;  ///< needs no confirmation by flow
+    bool certain = false;  ///< needs no confirmation by flow
   };
   /// Features of the keyframe, in place, that look like features of the frame.
   [[nodiscard]] std::vector<VisualMatch> pairs(const Frame& frame, const Keyframe& keyframe) const;

@@ -58,12 +58,15 @@ void DualStreamFlow::track_stream(const ImagePyramid& previous, const ImagePyram
   std::vector<cv::Point2f> to;
   for (const std::size_t i : chosen) {
     from.push_back(to_cv(seeds[i].previous));
-    to.push_back(from_prediction ? to_cv(*seeds[i].predicted) : from.back());
+    to.push_back(from_prediction ? to_cv(seeds[i].predicted.value_or(seeds[i].previous))
+                                 : from.back());
   }
   const int levels = from_prediction ? config_.prior_levels : config_.levels;
-  const auto found = LucasKanade{config_.window_px, levels}(previous, current, from, to);
+  const auto found =
+      LucasKanade{.window_px = config_.window_px, .levels = levels}(previous, current, from, to);
   std::vector<cv::Point2f> back = from;
-  const auto found_back = LucasKanade{config_.window_px, 0}(current, previous, to, back);
+  const auto found_back =
+      LucasKanade{.window_px = config_.window_px, .levels = 0}(current, previous, to, back);
 
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Vector2d pixel = from_cv(to[k]);
@@ -84,10 +87,10 @@ void DualStreamFlow::reject_by_epipolar_geometry(
   std::vector<cv::Point2f> from;
   std::vector<cv::Point2f> to;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
-    if (tracks[i]) {
+    if (const std::optional<Vector2d>& track = tracks[i]) {
       index.push_back(i);
       from.push_back(to_cv(camera_.undistort(seeds[i].previous)));
-      to.push_back(to_cv(camera_.undistort(*tracks[i])));
+      to.push_back(to_cv(camera_.undistort(*track)));
     }
   }
   if (index.size() < kEnoughForRansac) {
@@ -130,7 +133,8 @@ std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& p
   std::vector<std::optional<Vector2d>> tracks(seeds.size());
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
-    if (seeds[i].predicted && camera_.contains(*seeds[i].predicted, 1)) {
+    const std::optional<Vector2d>& predicted = seeds[i].predicted;
+    if (predicted && camera_.contains(*predicted, 1)) {
       chosen.push_back(i);
     }
   }

@@ -1,5 +1,7 @@
 #include "vision/image_pyramid.hpp"
 
+#include <cstddef>
+
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>

@@ -30,7 +30,7 @@ using Descriptor = std::array<std::uint64_t, 4>;
 /// A corner with its descriptor, at a raw pixel.
 struct OrbFeature {
   Vector2d pixel;
-  Descriptor descriptor;
+  Descriptor descriptor{};
 };
 
 /// ORB features spread over the image by a grid: the strongest few of each cell, so that texture in

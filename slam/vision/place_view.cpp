@@ -8,7 +8,6 @@
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 
-#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 
 #include "cloud/pixel_depth.hpp"

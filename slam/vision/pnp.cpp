@@ -1,6 +1,5 @@
 #include "vision/pnp.hpp"
 
-#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -8,9 +7,12 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
 
 #include "odometry/pose_optimiser.hpp"
+#include "vision/camera_model.hpp"
 
 namespace geoflow::slam {
 
@@ -45,7 +47,7 @@ std::optional<PnpSolution> solve_pnp(std::span<const VisualMatch> matches,
   if (!T_cam_odom.matrix().allFinite()) {
     return std::nullopt;
   }
-  return PnpSolution{T_cam_odom.inverse(), inliers.size()};
+  return PnpSolution{.T_odom_cam = T_cam_odom.inverse(), .inliers = inliers.size()};
 }
 
 }  // namespace geoflow::slam
