@@ -50,6 +50,7 @@ inline CameraOptions exact_options() {
   options.noise_scale = 0;
   options.depth_noise_scale = 0;
   options.depth_errors = false;
+  options.depth_truth = true;
   return options;
 }
 

@@ -49,6 +49,7 @@ TEST(Camera, ARenderedFrameIsTheSameWithAnyNumberOfThreads) {
   CameraOptions options;
   options.width = 320;
   options.height = 240;
+  options.depth_truth = true;
   const auto camera = make(scene, options);
   const Vector2d start = scene.path().front();
   const auto pose = [&](double t_s) { return looking(start.x() + t_s, start.y(), 0.1 * t_s); };

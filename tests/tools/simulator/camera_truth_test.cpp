@@ -196,6 +196,7 @@ WallNoise measure_wall(float distance_m, const CameraOptions& options) {
 TEST(CameraTruth, DepthNoiseFollowsTheStereoModel) {
   CameraOptions options;
   options.depth_errors = false;
+  options.depth_truth = true;
   const double focal_baseline =
       d435i_ir_intrinsics(options.width, options.height).fx * kD435iBaseline_m;
   double sum_xy = 0;

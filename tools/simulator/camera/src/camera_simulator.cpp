@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <tbb/parallel_invoke.h>
+
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
@@ -23,6 +25,7 @@
 #include "src/registration.hpp"
 #include "src/sensor.hpp"
 #include "src/shader.hpp"
+#include "src/steady_tiles.hpp"
 #include "src/stereo.hpp"
 
 namespace geoflow::simulator {
@@ -149,14 +152,34 @@ struct CameraSimulator::Parts {
                      .color = d435i_color_intrinsics(with.width, with.height),
                      .T_cam_ir = d435i_T_cam_ir()} {}
 
+  [[nodiscard]] Subject subject() const {
+    return {.scene = *scene, .rays = *rays, .shader = shader};
+  }
+
   [[nodiscard]] Exposure meter(double t_s, const PoseAt& T_world_cam) const {
     double luminance_nit = 0;
     for (const Metering& metering : kMeterings) {
       const double seen = static_cast<double>(metered_luminance(
-          *rays, shader, registration.color, T_world_cam(t_s - metering.before_s)));
+          subject(), registration.color, T_world_cam(t_s - metering.before_s), t_s));
       luminance_nit += metering.weight * seen;
     }
     return choose_exposure(luminance_nit, options);
+  }
+
+  /// Depth as measured, in whole millimetres, registered to colour.
+  [[nodiscard]] FrameRef measure_depth(double t_s, const PoseAt& T_world_cam,
+                                       std::uint64_t key) const {
+    const SE3 T_world_ir = T_world_cam(t_s) * registration.T_cam_ir;
+    const InfraredView seen =
+        see_infrared(*rays, shader, registration.depth, T_world_ir, rays->ray_time(t_s),
+                     static_cast<float>(options.projector_power));
+    const std::vector<float> depth_m = match_stereo(seen, registration.depth, options, key);
+    FrameRef depth = FramePool{1}.acquire(
+        {.width = options.width, .height = options.height, .format = PixelFormat::kDepth16});
+    std::vector<std::uint16_t> millimetres(depth_m.size());
+    align_to_color(depth_m, registration, millimetres);
+    std::ranges::copy(std::as_bytes(std::span{millimetres}), depth.writable_bytes().begin());
+    return depth;
   }
 
   const Scene* scene;
@@ -190,41 +213,34 @@ Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_in
   const std::uint64_t key = subkey(subkey(options.seed, "camera"), frame_index);
   const double t_depth_s = t_mid_exposure_s + options.depth_offset_s;
 
-  parts.rays->move_people(t_mid_exposure_s, t_mid_exposure_s);
+  // The longest exposure, whatever will be chosen, and depth's moment.
+  const double half_s = 0.5 * (options.exposure_max_s + options.readout_s);
+  parts.rays->move_people(std::min(t_mid_exposure_s - half_s, t_depth_s),
+                          std::max(t_mid_exposure_s + half_s, t_depth_s));
   parts.shader.move_people(t_mid_exposure_s);
-  const Exposure exposure = parts.meter(t_mid_exposure_s, T_world_cam);
-  const Shutter shutter{.t_mid_s = t_mid_exposure_s,
-                        .exposure_s = exposure.exposure_s,
-                        .readout_s = options.readout_s,
-                        .rows = options.height};
-  Rendered rendered{.color = {},
-                    .depth = {},
-                    .depth_truth = {},
-                    .exposure_s = exposure.exposure_s,
-                    .gain = exposure.gain};
-  parts.rays->move_people(shutter.begin_s(), shutter.end_s());
-  const std::vector<Rgb> light =
-      expose(*parts.rays, parts.shader, parts.registration.color, shutter, T_world_cam,
-             {.rays_a_pixel = options.subexposures, .key = subkey(key, "rays")});
-  rendered.color = develop(light, exposure, options, subkey(key, "sensor"));
-  rendered.depth_truth =
-      true_depth(*parts.rays, parts.registration.color, T_world_cam(t_mid_exposure_s), 0.5F);
-
-  if (!parts.scene->pedestrians.empty()) {
-    parts.rays->move_people(t_depth_s, t_depth_s);
-  }
-  const SE3 T_world_ir = T_world_cam(t_depth_s) * parts.registration.T_cam_ir;
-  const InfraredView seen =
-      see_infrared(*parts.rays, parts.shader, parts.registration.depth, T_world_ir, 0,
-                   static_cast<float>(options.projector_power));
-  const std::vector<float> depth_m =
-      match_stereo(seen, parts.registration.depth, options, subkey(key, "stereo"));
-  rendered.depth = FramePool{1}.acquire(
-      {.width = options.width, .height = options.height, .format = PixelFormat::kDepth16});
-  std::vector<std::uint16_t> millimetres(depth_m.size());
-  align_to_color(depth_m, parts.registration, millimetres);
-  const auto bytes = std::as_bytes(std::span{millimetres});
-  std::ranges::copy(bytes, rendered.depth.writable_bytes().begin());
+  Rendered rendered;
+  const auto see_color = [&] {
+    const Exposure exposure = parts.meter(t_mid_exposure_s, T_world_cam);
+    const Shutter shutter{.t_mid_s = t_mid_exposure_s,
+                          .exposure_s = exposure.exposure_s,
+                          .readout_s = options.readout_s,
+                          .rows = options.height};
+    const std::vector<Rgb> light =
+        expose(parts.subject(), parts.registration.color, shutter, T_world_cam,
+               {.rays_a_pixel = options.subexposures, .key = subkey(key, "rays")});
+    rendered.color = develop(light, exposure, options, subkey(key, "sensor"));
+    rendered.exposure_s = exposure.exposure_s;
+    rendered.gain = exposure.gain;
+  };
+  const auto see_depth = [&] {
+    rendered.depth = parts.measure_depth(t_depth_s, T_world_cam, subkey(key, "stereo"));
+    if (options.depth_truth) {
+      rendered.depth_truth =
+          true_depth(*parts.rays, parts.registration.color, T_world_cam(t_mid_exposure_s),
+                     parts.rays->ray_time(t_mid_exposure_s));
+    }
+  };
+  tbb::parallel_invoke(see_color, see_depth);
   return rendered;
 }
 

@@ -1,7 +1,6 @@
 #include "src/infrared_view.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <numbers>
 #include <vector>
@@ -27,19 +26,20 @@ constexpr float kTextureWeight = 2.0F;  // a contrast of 0.15 counts as a light 
 constexpr float kTextureLight_lux =
     15.0F;  // half of the texture's weight: the infrared cameras' noise
 
-float signal_of(const Surface& surface, float depth_m, float sun_lux, float projector_power) {
-  const Material& material = *surface.material;
+float signal_of(const Surfaces& seen, std::size_t lane, float depth_m, float sun_lux,
+                float projector_power) {
+  const Material& material = *seen.material[lane];
   const float reflectance =
-      material.ir_reflectance >= 0 ? material.ir_reflectance : luminance(surface.albedo);
-  const float mirror = Shader::mirror_reflectance(surface);
+      material.ir_reflectance >= 0 ? material.ir_reflectance : luminance(seen.albedo[lane]);
+  const float mirror = Shader::mirror_reflectance(material, seen.cosine[lane]);
   const float diffuse = reflectance * (1.0F - mirror) * (1.0F - mirror);
-  const float pattern = projector_power * surface.cosine * diffuse /
+  const float pattern = projector_power * seen.cosine[lane] * diffuse /
                         (kReferenceReflectance * depth_m * depth_m) /
                         (1.0F + sun_lux / kDrowningSun_lux);
-  const float light = luminance(surface.irradiance) * reflectance +
+  const float light = luminance(seen.irradiance[lane]) * reflectance +
                       material.emission_nit * std::numbers::pi_v<float>;
   const float texture =
-      kTextureWeight * surface.contrast * (1.0F - mirror) * light / (light + kTextureLight_lux);
+      kTextureWeight * seen.contrast[lane] * (1.0F - mirror) * light / (light + kTextureLight_lux);
   return pattern + texture;
 }
 
@@ -65,16 +65,16 @@ InfraredView see_infrared(const RayScene& rays, const Shader& shader,
       packet.ray.time[i] = ray_time;
     }
     rays.trace(tile.valid, packet);
+    const Surfaces surfaces = shader.surfaces(
+        tile.valid, packet, {.footprint_per_t = pinhole.inverse_fx, .contrast = true});
     for (std::size_t i = 0; i < kPacket; ++i) {
-      if (tile.valid[i] == 0 || packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+      if (surfaces.material[i] == nullptr) {
         continue;
       }
       const std::size_t pixel =
           static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i));
-      const Surface surface = shader.surface(
-          packet, i, {.footprint_per_t = pinhole.inverse_fx, .quickly = true, .contrast = true});
       seen.depth_m[pixel] = packet.ray.tfar[i];
-      seen.signal[pixel] = signal_of(surface, packet.ray.tfar[i], sun_lux, projector_power);
+      seen.signal[pixel] = signal_of(surfaces, i, packet.ray.tfar[i], sun_lux, projector_power);
     }
   });
   return seen;

@@ -4,12 +4,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <utility>
 #include <vector>
 
 #include <tbb/parallel_for.h>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/ray_scene.hpp"
@@ -197,7 +199,7 @@ Rgb Lighting::indirect(const Vector3f& point, const Vector3f& normal, float clea
                             .cross(normal)
                             .normalized();
   const Vector3f other = normal.cross(side);
-  std::array<int, kPacket> valid;
+  Valid valid;
   valid.fill(-1);
   Rgb sum{};
   for (std::size_t first = 0; first < kGather; first += kPacket) {
@@ -279,6 +281,34 @@ Rgb Lighting::on_patch(std::size_t patch, float u, float v) const noexcept {
   const Rgb* high = low + map.columns;
   return (low[0] * (1.0F - fx) + low[1] * fx) * (1.0F - fy) +
          (high[0] * (1.0F - fx) + high[1] * fx) * fy;
+}
+
+void Lighting::on_patch(std::size_t patch, const Lanes& u, const Lanes& v,
+                        LaneColours& out) const noexcept {
+  const Map map = maps_[patch];
+  const Rgb* texels = &texels_[map.first];
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    const auto most_x = static_cast<float>(map.columns - 1);
+    const auto most_y = static_cast<float>(map.rows - 1);
+    Taps taps;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float x = held(u[i] * map.columns_per_m - 0.5F, 0.0F, most_x);
+      const float y = held(v[i] * map.rows_per_m - 0.5F, 0.0F, most_y);
+      const int x0 = std::min(static_cast<int>(x), map.columns - 2);
+      const int y0 = std::min(static_cast<int>(y), map.rows - 2);
+      taps.weigh(i, x - static_cast<float>(x0), y - static_cast<float>(y0));
+      const auto first = static_cast<std::uint32_t>(y0 * map.columns + x0);
+      const auto columns = static_cast<std::uint32_t>(map.columns);
+      taps.index[0][i] = first;
+      taps.index[1][i] = first + 1;
+      taps.index[2][i] = first + columns;
+      taps.index[3][i] = first + columns + 1;
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      out[i] =
+          taps.mix(i, [&](std::uint32_t at) __attribute__((always_inline)) { return texels[at]; });
+    }
+  });
 }
 
 LightCube Lighting::around(const Vector3f& point, float clear_radius_m) const {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/ray_scene.hpp"
@@ -26,6 +27,8 @@ class Lighting {
 
   /// Irradiance [lux] on a patch at (u, v) [m], bilinear between texels of some centimetres.
   [[nodiscard]] Rgb on_patch(std::size_t patch, float u, float v) const noexcept;
+  /// The same at many points of one patch.
+  void on_patch(std::size_t patch, const Lanes& u, const Lanes& v, LaneColours& out) const noexcept;
   /// Around a static capsule's ends.
   [[nodiscard]] const std::array<LightCube, 2>& around_capsule(std::size_t capsule) const noexcept {
     return capsules_[capsule];

@@ -83,13 +83,18 @@ void set_facets(RTCGeometry geometry, std::size_t capsules) {
   }
 }
 
-void intersect(RTCScene scene, const std::array<int, kPacket>& valid, RayPacket& packet) {
+void attach(RTCScene scene, RTCGeometry geometry, HitKind kind) {
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, static_cast<unsigned>(kind));
+}
+
+void intersect(RTCScene scene, const Valid& valid, RayPacket& packet) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   // Embree reads both as whole vectors.
   constexpr std::size_t kVectorBytes = 64;
-  alignas(kVectorBytes) const std::array<int, kPacket> aligned = valid;
+  alignas(kVectorBytes) const Valid aligned = valid;
   rtcIntersect16(aligned.data(), scene, &context, &packet);
 }
 
@@ -102,32 +107,19 @@ Result<std::unique_ptr<RayScene>> RayScene::create(const Scene& scene) {
     return fail(ErrorCode::kSystem, "Embree does not start (error {})",
                 static_cast<int>(rtcGetDeviceError(nullptr)));
   }
-  made->all_.reset(rtcNewScene(made->device_.get()));
-  if (!scene.pedestrians.empty()) {
-    rtcSetSceneFlags(made->all_.get(), RTC_SCENE_FLAG_DYNAMIC);
-    made->standing_.reset(rtcNewScene(made->device_.get()));
-  }
+  made->standing_.reset(rtcNewScene(made->device_.get()));
+  // It is built once and traced millions of times a frame.
+  rtcSetSceneBuildQuality(made->standing_.get(), RTC_BUILD_QUALITY_HIGH);
   made->add_patches();
   made->add_capsules();
+  rtcCommitScene(made->standing_.get());
   made->add_people();
-  if (made->standing_) {
-    rtcCommitScene(made->standing_.get());
-  }
-  rtcCommitScene(made->all_.get());
   const RTCError error = rtcGetDeviceError(made->device_.get());
   if (error != RTC_ERROR_NONE) {
     return fail(ErrorCode::kSystem, "Embree refuses the scene {} (error {})", scene.name,
                 static_cast<int>(error));
   }
   return made;
-}
-
-void RayScene::attach(RTCGeometry geometry, HitKind kind, bool moves) {
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(all_.get(), geometry, static_cast<unsigned>(kind));
-  if (standing_ && !moves) {
-    rtcAttachGeometryByID(standing_.get(), geometry, static_cast<unsigned>(kind));
-  }
 }
 
 void RayScene::add_patches() {
@@ -143,7 +135,7 @@ void RayScene::add_patches() {
       ++next;
     }
   }
-  attach(geometry.get(), HitKind::kPatch, false);
+  attach(standing_.get(), geometry.get(), HitKind::kPatch);
 }
 
 void RayScene::add_capsules() {
@@ -157,7 +149,7 @@ void RayScene::add_capsules() {
     write_capsule(capsules[i], vertices + 3 * kCorners * i);
   }
   set_facets(geometry.get(), capsules.size());
-  attach(geometry.get(), HitKind::kCapsule, false);
+  attach(standing_.get(), geometry.get(), HitKind::kCapsule);
 }
 
 void RayScene::add_people() {
@@ -165,20 +157,25 @@ void RayScene::add_people() {
   if (count == 0) {
     return;
   }
+  walking_.reset(rtcNewScene(device_.get()));
+  rtcSetSceneFlags(walking_.get(), RTC_SCENE_FLAG_DYNAMIC);
   people_.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD));
   rtcSetGeometryTimeStepCount(people_.get(), 2);
   people_begin_.resize(count);
   people_vertices_ = {new_corners(people_.get(), 0, kCorners * count),
                       new_corners(people_.get(), 1, kCorners * count)};
   set_facets(people_.get(), count);
+  attach(walking_.get(), people_.get(), HitKind::kPerson);
   move_people(0, 0);
-  attach(people_.get(), HitKind::kPerson, true);
 }
 
 void RayScene::move_people(double begin_s, double end_s) {
   if (!people_) {
     return;
   }
+  people_begin_s_ = begin_s;
+  people_end_s_ = end_s;
+  people_travel_m_ = 0;
   std::size_t next = 0;
   for (const Pedestrian& person : scene_->pedestrians) {
     const auto begin = person.body(begin_s);
@@ -187,12 +184,25 @@ void RayScene::move_people(double begin_s, double end_s) {
       write_capsule(begin[i], people_vertices_[0] + 3 * kCorners * next);
       write_capsule(end[i], people_vertices_[1] + 3 * kCorners * next);
       people_begin_[next] = begin[i];
+      people_travel_m_ = std::max({people_travel_m_, (end[i].start - begin[i].start).norm(),
+                                   (end[i].end - begin[i].end).norm()});
     }
   }
   rtcUpdateGeometryBuffer(people_.get(), RTC_BUFFER_TYPE_VERTEX, 0);
   rtcUpdateGeometryBuffer(people_.get(), RTC_BUFFER_TYPE_VERTEX, 1);
   rtcCommitGeometry(people_.get());
-  rtcCommitScene(all_.get());
+  rtcCommitScene(walking_.get());
+}
+
+float RayScene::ray_time(double t_s) const noexcept {
+  const double span_s = people_end_s_ - people_begin_s_;
+  return span_s > 0 ? static_cast<float>(std::clamp((t_s - people_begin_s_) / span_s, 0.0, 1.0))
+                    : 0.0F;
+}
+
+float RayScene::people_travel_m(double duration_s) const noexcept {
+  const double span_s = people_end_s_ - people_begin_s_;
+  return span_s > 0 ? people_travel_m_ * static_cast<float>(duration_s / span_s) : 0.0F;
 }
 
 std::size_t RayScene::primitive(const RayPacket& packet, std::size_t lane) {
@@ -213,12 +223,15 @@ void RayScene::reset(RayPacket& packet) {
   }
 }
 
-void RayScene::trace(const std::array<int, kPacket>& valid, RayPacket& packet) const {
-  intersect(all_.get(), valid, packet);
+void RayScene::trace(const Valid& valid, RayPacket& packet) const {
+  intersect(standing_.get(), valid, packet);
+  if (walking_) {
+    intersect(walking_.get(), valid, packet);
+  }
 }
 
-void RayScene::trace_static(const std::array<int, kPacket>& valid, RayPacket& packet) const {
-  intersect(standing_ ? standing_.get() : all_.get(), valid, packet);
+void RayScene::trace_static(const Valid& valid, RayPacket& packet) const {
+  intersect(standing_.get(), valid, packet);
 }
 
 bool RayScene::blocked(const Vector3f& from, const Vector3f& to) const {
@@ -236,7 +249,7 @@ bool RayScene::blocked(const Vector3f& from, const Vector3f& to) const {
   ray.tnear = kGap_m;
   ray.tfar = distance - kGap_m;
   ray.mask = ~0U;
-  rtcOccluded1(standing_ ? standing_.get() : all_.get(), &context, &ray);
+  rtcOccluded1(standing_.get(), &context, &ray);
   return ray.tfar < 0;
 }
 

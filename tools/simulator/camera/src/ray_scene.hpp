@@ -9,12 +9,14 @@
 #include <embree3/rtcore.h>
 
 #include "geoflow/hal/result.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 namespace geoflow::simulator {
 
-inline constexpr std::size_t kPacket = 16;  ///< rays traced together
+inline constexpr std::size_t kPacket = kLanes;  ///< rays traced together
 using RayPacket = RTCRayHit16;
+using Valid = std::array<int, kPacket>;  ///< -1: this lane's ray counts; 0: it does not
 
 /// What a ray hit, as Embree's geometry number.
 enum class HitKind : unsigned { kPatch = 0, kCapsule = 1, kPerson = 2 };
@@ -24,16 +26,21 @@ class RayScene {
  public:
   [[nodiscard]] static Result<std::unique_ptr<RayScene>> create(const Scene& scene);
 
-  /// From here on, ray time 0 … 1 stands for begin_s … end_s in the people's walk.
+  /// From here on, rays see the people walk from where they are at begin_s to where they are at
+  /// end_s.
   void move_people(double begin_s, double end_s);
+  /// The ray time of a moment; 0 … 1 within what the people were moved to, and never beyond.
+  [[nodiscard]] float ray_time(double t_s) const noexcept;
+  /// How far any part of the people moves during a time, at most [m].
+  [[nodiscard]] float people_travel_m(double duration_s) const noexcept;
 
   /// Sets a packet's members that all rays share: no hit yet, time 0, from 1 mm on to infinity.
   static void reset(RayPacket& packet);
   /// The first hits of the lanes with valid[i] == -1; hit.geomID stays RTC_INVALID_GEOMETRY_ID
   /// without one.
-  void trace(const std::array<int, kPacket>& valid, RayPacket& packet) const;
+  void trace(const Valid& valid, RayPacket& packet) const;
   /// The same among the things that stand still.
-  void trace_static(const std::array<int, kPacket>& valid, RayPacket& packet) const;
+  void trace_static(const Valid& valid, RayPacket& packet) const;
   /// Is there something that stands still between `from` and `to`, 2 mm from either?
   [[nodiscard]] bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;
 
@@ -55,16 +62,18 @@ class RayScene {
   using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
   explicit RayScene(const Scene& scene) : scene_{&scene} {}
-  void attach(RTCGeometry geometry, HitKind kind, bool moves);
   void add_patches();
   void add_capsules();
   void add_people();
 
   const Scene* scene_;
   Owned<RTCDevice> device_;
-  Owned<RTCScene> all_;
-  Owned<RTCScene> standing_;  ///< without the people; null if there are none
+  Owned<RTCScene> standing_;
+  Owned<RTCScene> walking_;  ///< the people; null if there are none
   Owned<RTCGeometry> people_;
+  double people_begin_s_ = 0;
+  double people_end_s_ = 0;
+  float people_travel_m_ = 0;  ///< between the two
   std::vector<Capsule> people_begin_;
   std::array<float*, 2> people_vertices_{};  ///< Embree's buffers for ray time 0 and 1
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include "geoflow/hal/image.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 
@@ -66,15 +68,22 @@ struct Pixel {
   float inverse_full_well;  ///< with gain
   float noise_scale;
 
-  [[nodiscard]] Rgb read(const Rgb& light, std::uint64_t key) const noexcept {
+  /// `bits`: of this pixel.
+  [[nodiscard, gnu::always_inline]] inline Rgb read(const Rgb& light,
+                                                    std::uint32_t bits) const noexcept {
     constexpr auto kReadVariance = static_cast<float>(kReadNoise * kReadNoise);
-    Rgb signal = light * electrons_per_nit;
-    for (int c = 0; c < 3; ++c) {
-      const float deviation = noise_scale * std::sqrt(std::max(signal[c], 0.0F) + kReadVariance);
-      signal[c] += deviation * to_normal(scramble(key + static_cast<std::uint64_t>(c)));
+    const Rgb signal = light * electrons_per_nit;
+    std::array<float, 4> noise{};
+    for (std::size_t c = 0; c < noise.size(); ++c) {
+      const float variance = std::max(signal[static_cast<int>(c)], 0.0F) + kReadVariance;
+      noise[c] = std::sqrt(variance) *
+                 to_normal32(scramble32(bits + static_cast<std::uint32_t>(c) * kChannelStep));
     }
-    return signal * inverse_full_well;
+    return (signal + noise_scale * std::bit_cast<Rgb>(noise)) * inverse_full_well;
   }
+
+ private:
+  static constexpr std::uint32_t kChannelStep = 0x9e3779b9U;  // 2^32 over the golden ratio
 };
 
 }  // namespace
@@ -99,16 +108,20 @@ FrameRef develop(const std::vector<Rgb>& luminance_nit, const Exposure& exposure
                     .noise_scale = static_cast<float>(options.noise_scale)};
   const auto width = static_cast<std::size_t>(options.width);
   tbb::parallel_for(std::size_t{0}, static_cast<std::size_t>(options.height), [&](std::size_t row) {
-    for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
-      const Rgb value = pixel.read(luminance_nit[i], subkey(key, i));
-      if (grey) {
-        bytes[i] = static_cast<std::byte>(curve(luminance(value)));
-      } else {
-        for (std::size_t c = 0; c < 3; ++c) {
-          bytes[3 * i + c] = static_cast<std::byte>(curve(value[2 - c]));
+    with_wide_vectors([&]() __attribute__((always_inline)) {
+      const auto row_key = static_cast<std::uint32_t>(subkey(key, row));
+      for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
+        const Rgb value =
+            pixel.read(luminance_nit[i], scramble32(row_key + static_cast<std::uint32_t>(i)));
+        if (grey) {
+          bytes[i] = static_cast<std::byte>(curve(luminance(value)));
+        } else {
+          for (std::size_t c = 0; c < 3; ++c) {
+            bytes[3 * i + c] = static_cast<std::byte>(curve(value[2 - c]));
+          }
         }
       }
-    }
+    });
   });
   return frame;
 }

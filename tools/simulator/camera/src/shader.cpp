@@ -1,18 +1,19 @@
 #include "src/shader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/lighting.hpp"
 #include "src/ray_scene.hpp"
+#include "src/view.hpp"
 
 namespace geoflow::simulator {
 namespace {
@@ -26,11 +27,25 @@ constexpr float kFaintestMirror = 0.004F;  // below this a reflection is not tra
 constexpr float kShortest_m2 = 1e-8F;
 constexpr float kBrightestGlint = 1.5F;  // of white paper in the same light
 constexpr float kFaintest_nit = 1e-6F;
-constexpr float kBodyRadius_m = 0.26F;
-constexpr float kBody_m = 1.0F;  // the height of a body's middle
+constexpr float kShadow_m = 0.52F;       // about the feet's middle
+constexpr float kShadowHeight_m = 0.5F;  // above the floor
+constexpr float kBody_m = 1.0F;          // the height of a body's middle
 
 Vector3f direction_of(const RayPacket& packet, std::size_t lane) {
   return {packet.ray.dir_x[lane], packet.ray.dir_y[lane], packet.ray.dir_z[lane]};
+}
+
+Vector3f end_of(const RayPacket& packet, std::size_t lane) {
+  return Vector3f{packet.ray.org_x[lane], packet.ray.org_y[lane], packet.ray.org_z[lane]} +
+         packet.ray.tfar[lane] * direction_of(packet, lane);
+}
+
+/// How many of a pixel's rays see a mirror image that makes that share of its light.
+int mirror_rays(float share, int rays_a_pixel) {
+  constexpr float kFewest = 0.25F;
+  constexpr float kEager = 2.0F;
+  const float part = std::clamp(kEager * share, kFewest, 1.0F);
+  return static_cast<int>(std::ceil(part * static_cast<float>(rays_a_pixel)));
 }
 
 }  // namespace
@@ -63,193 +78,298 @@ void Shader::move_people(double t_s) {
   }
 }
 
-float Shader::person_shadow(const Vector3f& point) const {
-  constexpr float kReach_m = 0.5F;  // above the floor
+void Shader::dim_by_people(const Hits& hits, LaneColours& irradiance) const {
   constexpr float kIndoors =
       0.6F;  // of the light from all sides that feet and legs take from the floor beneath
   constexpr float kSunShare = 0.85F;
-  if (point.z() > kReach_m) {
-    return 1.0F;
-  }
-  float light = 1;
-  for (const Person& person : people_) {
-    const Vector2f from = point.head<2>() - person.position;
-    const float length2 = std::max(person.shadow.squaredNorm(), kFlattest);
-    const float along = std::clamp(from.dot(person.shadow) / length2, 0.0F, 1.0F);
-    const float distance2 = (from - along * person.shadow).squaredNorm();
-    const float depth = (scene_->daylight ? kSunShare : kIndoors) * (1.0F - point.z() / kReach_m);
-    light *= 1.0F - depth * std::exp(-distance2 / (2.0F * kBodyRadius_m * kBodyRadius_m));
-  }
-  return light;
-}
-
-void Shader::look_at_patch(std::size_t index, const Look& look, float t, Surface& surface) const {
-  const Patch& patch = scene_->patches[index];
-  const Vector3f from = surface.point - patch.origin;
-  const float u = from.dot(patch.axis_u);
-  const float v = from.dot(patch.axis_v);
-  surface.irradiance = lighting_->on_patch(index, u, v);
-  if (!people_.empty()) {
-    surface.irradiance *= person_shadow(surface.point);
-  }
-  const Material& material = *surface.material;
-  if (material.texture < 0) {
+  const float most = scene_->daylight ? kSunShare : kIndoors;
+  if (*std::ranges::min_element(hits.z) > kShadowHeight_m) {
     return;
   }
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    Lanes light;
+    light.fill(1.0F);
+    for (const Person& person : people_) {
+      const float x = person.position.x();
+      const float y = person.position.y();
+      const float away_x = person.shadow.x();
+      const float away_y = person.shadow.y();
+      const float inverse_length2 = 1.0F / std::max(person.shadow.squaredNorm(), kFlattest);
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const float from_x = hits.x[i] - x;
+        const float from_y = hits.y[i] - y;
+        const float along = held((from_x * away_x + from_y * away_y) * inverse_length2, 0.0F, 1.0F);
+        const float off_x = from_x - along * away_x;
+        const float off_y = from_y - along * away_y;
+        const float distance2 = off_x * off_x + off_y * off_y;
+        // Falls like a normal curve of half the radius, and ends.
+        const float near = held(1.0F - distance2 / (kShadow_m * kShadow_m), 0.0F, 1.0F);
+        const float low = held(1.0F - hits.z[i] / kShadowHeight_m, 0.0F, 1.0F);
+        light[i] *= 1.0F - most * low * near * near;
+      }
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      irradiance[i] *= light[i];
+    }
+  });
+}
+
+Shader::Hits Shader::meet(const Patch& patch, const RayPacket& packet, const Look& look,
+                          std::size_t lane) {
   // Jitter spreads a pixel's rays over it both ways, so that each may look finer; the longer axis
   // of the footprint decides.
   constexpr float kSharpening = 0.7F;
-  const float facing = t * look.footprint_per_t;
-  const float footprint =
-      facing * std::max(kSharpening, 1.0F / (std::max(surface.cosine, kFlattest) * look.spread));
+  Hits hits;
+  const Vector3f normal = patch.normal();
+  hits.facing = normal.dot(direction_of(packet, lane)) > 0 ? -1.0F : 1.0F;
+  const float inverse_rays = 1.0F / static_cast<float>(look.rays_a_pixel);
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    const auto& ray = packet.ray;
+    const float origin_u = patch.origin.dot(patch.axis_u);
+    const float origin_v = patch.origin.dot(patch.axis_v);
+    const float ux = patch.axis_u.x();
+    const float uy = patch.axis_u.y();
+    const float uz = patch.axis_u.z();
+    const float vx = patch.axis_v.x();
+    const float vy = patch.axis_v.y();
+    const float vz = patch.axis_v.z();
+    const float nx = normal.x();
+    const float ny = normal.y();
+    const float nz = normal.z();
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float t = ray.tfar[i];
+      const float x = ray.org_x[i] + t * ray.dir_x[i];
+      const float y = ray.org_y[i] + t * ray.dir_y[i];
+      const float z = ray.org_z[i] + t * ray.dir_z[i];
+      hits.x[i] = x;
+      hits.y[i] = y;
+      hits.z[i] = z;
+      // Lanes that hit something else must stay within the patch's tables.
+      hits.u[i] = held(x * ux + y * uy + z * uz - origin_u, 0.0F, patch.size_m.x());
+      hits.v[i] = held(x * vx + y * vy + z * vz - origin_v, 0.0F, patch.size_m.y());
+      const float squared =
+          ray.dir_x[i] * ray.dir_x[i] + ray.dir_y[i] * ray.dir_y[i] + ray.dir_z[i] * ray.dir_z[i];
+      const float towards = nx * ray.dir_x[i] + ny * ray.dir_y[i] + nz * ray.dir_z[i];
+      const float cosine = std::abs(towards) / std::sqrt(squared);
+      hits.cosine[i] = cosine;
+      hits.footprint[i] = t * look.footprint_per_t *
+                          std::max(kSharpening, inverse_rays / std::max(cosine, kFlattest));
+    }
+  });
+  return hits;
+}
+
+void Shader::paint(const Patch& patch, const Hits& hits, const Look& look, LaneColours& albedo,
+                   Lanes& contrast) const {
+  // Turned, so that the two do not repeat together.
+  constexpr float kCos = 0.8F;
+  constexpr float kSin = 0.6F;
+  const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
   const Texture& texture = scene_->textures[static_cast<std::size_t>(material.texture)];
-  const float texture_u = u + patch.texture_offset_m.x();
-  const float texture_v = v + patch.texture_offset_m.y();
-  surface.albedo *= look.quickly ? texture.sample_quickly(texture_u, texture_v, footprint)
-                                 : texture.sample(texture_u, texture_v, footprint);
-  if (look.contrast) {
-    surface.contrast = texture.contrast(footprint);
+  Texture::Spots spots{.u_m = {}, .v_m = {}, .footprint_m = hits.footprint};
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    spots.u_m[i] = hits.u[i] + patch.texture_offset_m.x();
+    spots.v_m[i] = hits.v[i] + patch.texture_offset_m.y();
   }
-  if (material.overlay >= 0) {
-    // Turned, so that the two do not repeat together.
-    constexpr float kCos = 0.8F;
-    constexpr float kSin = 0.6F;
-    const auto overlay = static_cast<std::size_t>(material.overlay);
-    surface.albedo *=
-        scene_->textures[overlay].sample_quickly(kCos * texture_u - kSin * texture_v,
-                                                 kSin * texture_u + kCos * texture_v, footprint) *
-        overlay_scale_[overlay];
-    if (look.contrast) {
-      surface.contrast += scene_->textures[overlay].contrast(footprint);
+  texture.sample(spots, look.dither, albedo);
+  const auto add_contrast = [&](const Texture& of) {
+    for (std::size_t i = 0; look.contrast && i < kLanes; ++i) {
+      contrast[i] += of.contrast(hits.footprint[i]);
     }
-  }
-}
-
-Surface Shader::surface(const RayPacket& packet, std::size_t lane, const Look& look) const {
-  Surface surface;
-  const unsigned kind = packet.hit.geomID[lane];
-  if (kind == RTC_INVALID_GEOMETRY_ID) {
-    return surface;
-  }
-  const float t = packet.ray.tfar[lane];
-  const Vector3f direction = direction_of(packet, lane);
-  surface.point = Vector3f{packet.ray.org_x[lane], packet.ray.org_y[lane], packet.ray.org_z[lane]} +
-                  t * direction;
-  surface.normal =
-      Vector3f{packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]}.normalized();
-  const float towards = surface.normal.dot(direction) / direction.norm();
-  if (towards > 0) {
-    surface.normal = -surface.normal;
-  }
-  surface.cosine = std::abs(towards);
-  const std::size_t primitive = RayScene::primitive(packet, lane);
-  const auto use = [&](int material) {
-    surface.material = &scene_->materials[static_cast<std::size_t>(material)];
-    surface.albedo = surface.material->albedo;
   };
-  switch (static_cast<HitKind>(kind)) {
-    case HitKind::kPatch:
-      use(scene_->patches[primitive].material);
-      look_at_patch(primitive, look, t, surface);
-      break;
-    case HitKind::kCapsule: {
-      use(scene_->capsules[primitive].material);
-      if (surface.material->texture >= 0) {
-        surface.albedo *=
-            scene_->textures[static_cast<std::size_t>(surface.material->texture)].mean();
-      }
-      const auto& [start, end] = lighting_->around_capsule(primitive);
-      const Capsule& capsule = scene_->capsules[primitive];
-      const Vector3f axis = capsule.end - capsule.start;
-      const float along = std::clamp(
-          (surface.point - capsule.start).dot(axis) / std::max(axis.squaredNorm(), kShortest_m2),
-          0.0F, 1.0F);
-      surface.normal = (surface.point - capsule.start - along * axis).normalized();
-      surface.irradiance =
-          start.at(surface.normal) * (1.0F - along) + end.at(surface.normal) * along;
-      break;
+  add_contrast(texture);
+  Rgb scale = material.albedo;
+  if (material.overlay >= 0) {
+    const auto index = static_cast<std::size_t>(material.overlay);
+    const Texture& overlay = scene_->textures[index];
+    Texture::Spots turned{.u_m = {}, .v_m = {}, .footprint_m = hits.footprint};
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      turned.u_m[i] = kCos * spots.u_m[i] - kSin * spots.v_m[i];
+      turned.v_m[i] = kSin * spots.u_m[i] + kCos * spots.v_m[i];
     }
-    case HitKind::kPerson:
-      use(rays_->person_capsule(primitive).material);
-      surface.irradiance = people_[primitive / Pedestrian::kCapsules].light.at(surface.normal);
-      break;
+    LaneColours stains;
+    overlay.sample(turned, 0.5F, stains);
+    add_contrast(overlay);
+    scale *= overlay_scale_[index];
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      albedo[i] *= stains[i];
+    }
   }
-  return surface;
+  for (Rgb& colour : albedo) {
+    colour *= scale;
+  }
 }
 
-float Shader::mirror_reflectance(const Surface& surface) noexcept {
-  const float grazing = 1.0F - surface.cosine;
+void Shader::look_at_patch(std::size_t index, const Valid& lanes, const RayPacket& packet,
+                           const Look& look, Surfaces& seen) const {
+  const Patch& patch = scene_->patches[index];
+  const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
+  const auto first = static_cast<std::size_t>(std::ranges::find(lanes, -1) - lanes.begin());
+  const Hits hits = meet(patch, packet, look, first);
+  LaneColours irradiance;
+  lighting_->on_patch(index, hits.u, hits.v, irradiance);
+  if (!people_.empty()) {
+    dim_by_people(hits, irradiance);
+  }
+  LaneColours albedo;
+  Lanes contrast{};
+  if (material.texture >= 0) {
+    paint(patch, hits, look, albedo, contrast);
+  } else {
+    albedo.fill(material.albedo);
+  }
+  const Vector3f normal = hits.facing * patch.normal();
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    if (lanes[i] != 0) {
+      seen.material[i] = &material;
+      seen.albedo[i] = albedo[i];
+      seen.irradiance[i] = irradiance[i];
+      seen.normal_x[i] = normal.x();
+      seen.normal_y[i] = normal.y();
+      seen.normal_z[i] = normal.z();
+      seen.cosine[i] = hits.cosine[i];
+      seen.contrast[i] = contrast[i];
+    }
+  }
+}
+
+void Shader::look_at_round(std::size_t lane, const RayPacket& packet, Surfaces& seen) const {
+  const Vector3f direction = direction_of(packet, lane);
+  const std::size_t primitive = RayScene::primitive(packet, lane);
+  const bool person = packet.hit.geomID[lane] == static_cast<unsigned>(HitKind::kPerson);
+  const Capsule& capsule = person ? rays_->person_capsule(primitive) : scene_->capsules[primitive];
+  const Material& material = scene_->materials[static_cast<std::size_t>(capsule.material)];
+  Vector3f normal =
+      Vector3f{packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]}.normalized();
+  const float towards = normal.dot(direction) / direction.norm();
+  normal = towards > 0 ? Vector3f{-normal} : normal;
+  seen.material[lane] = &material;
+  seen.albedo[lane] = material.albedo;
+  if (material.texture >= 0) {
+    seen.albedo[lane] *= scene_->textures[static_cast<std::size_t>(material.texture)].mean();
+  }
+  if (person) {
+    seen.irradiance[lane] = people_[primitive / Pedestrian::kCapsules].light.at(normal);
+  } else {
+    const auto& [start, end] = lighting_->around_capsule(primitive);
+    const Vector3f axis = capsule.end - capsule.start;
+    const Vector3f from = end_of(packet, lane) - capsule.start;
+    const float along =
+        std::clamp(from.dot(axis) / std::max(axis.squaredNorm(), kShortest_m2), 0.0F, 1.0F);
+    normal = (from - along * axis).normalized();
+    seen.irradiance[lane] = start.at(normal) * (1.0F - along) + end.at(normal) * along;
+  }
+  seen.normal_x[lane] = normal.x();
+  seen.normal_y[lane] = normal.y();
+  seen.normal_z[lane] = normal.z();
+  seen.cosine[lane] = std::abs(towards);
+}
+
+Surfaces Shader::surfaces(const Valid& valid, const RayPacket& packet, const Look& look) const {
+  Surfaces seen;
+  Valid left = valid;
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const unsigned kind = packet.hit.geomID[i];
+    if (left[i] == 0 || kind == RTC_INVALID_GEOMETRY_ID) {
+      continue;
+    }
+    if (kind != static_cast<unsigned>(HitKind::kPatch)) {
+      look_at_round(i, packet, seen);
+      continue;
+    }
+    const unsigned patch = packet.hit.primID[i];
+    Valid same{};
+    for (std::size_t k = 0; k < kPacket; ++k) {
+      const bool also = packet.hit.geomID[k] == kind && packet.hit.primID[k] == patch;
+      same[k] = also ? left[k] : 0;
+      left[k] = also ? 0 : left[k];
+    }
+    look_at_patch(patch, same, packet, look, seen);
+  }
+  return seen;
+}
+
+float Shader::mirror_reflectance(const Material& material, float cosine) noexcept {
+  const float grazing = 1.0F - cosine;
   const float power = grazing * grazing * grazing * grazing * grazing;
-  const float reflectivity = surface.material->reflectivity;
+  const float reflectivity = material.reflectivity;
   return reflectivity <= 0 ? 0 : reflectivity + (1.0F - reflectivity) * power;
 }
 
-Rgb Shader::diffuse(const Surface& surface) noexcept {
-  return surface.albedo * (surface.irradiance * kInversePi + surface.material->emission_nit);
+Rgb Shader::light_of(const Surfaces& seen, const RayPacket& packet, std::size_t lane) const {
+  if (seen.material[lane] == nullptr) {
+    return lighting_->sky(direction_of(packet, lane).normalized());
+  }
+  return seen.albedo[lane] *
+         (seen.irradiance[lane] * kInversePi + seen.material[lane]->emission_nit);
 }
 
-void Shader::shade(const std::array<int, kPacket>& valid, const RayPacket& packet, const Look& look,
-                   std::array<Rgb, kPacket>& out) const {
-  std::array<Surface, kPacket> surfaces;
+void Shader::shade(const Valid& valid, const RayPacket& packet, const Look& look,
+                   LaneColours& out) const {
+  const Surfaces seen = surfaces(valid, packet, look);
   bool mirrors = false;
   for (std::size_t i = 0; i < kPacket; ++i) {
-    if (valid[i] == 0) {
-      continue;
-    }
-    surfaces[i] = surface(packet, i, look);
-    if (surfaces[i].material == nullptr) {
-      out[i] = lighting_->sky(direction_of(packet, i).normalized());
-    } else {
-      out[i] = diffuse(surfaces[i]);
-      mirrors = mirrors || mirror_reflectance(surfaces[i]) > kFaintestMirror;
+    if (valid[i] != 0) {
+      out[i] = light_of(seen, packet, i);
+      mirrors = mirrors || (seen.material[i] != nullptr && seen.material[i]->reflectivity > 0);
     }
   }
   if (mirrors) {
-    add_mirrors(surfaces, packet, look, out);
+    add_mirrors(seen, packet, look, out);
   }
 }
 
-void Shader::add_mirrors(const std::array<Surface, kPacket>& surfaces, const RayPacket& packet,
-                         const Look& look, std::array<Rgb, kPacket>& out) const {
-  std::array<int, kPacket> valid{};
+void Shader::add_mirrors(const Surfaces& seen, const RayPacket& packet, const Look& look,
+                         LaneColours& out) const {
+  Valid valid{};
+  Lanes weight{};
   RayPacket mirrored;
   RayScene::reset(mirrored);
+  bool any = false;
   for (std::size_t i = 0; i < kPacket; ++i) {
-    if (surfaces[i].material == nullptr || mirror_reflectance(surfaces[i]) <= kFaintestMirror) {
+    if (seen.material[i] == nullptr) {
       continue;
     }
+    const float share = mirror_reflectance(*seen.material[i], seen.cosine[i]);
+    if (share <= kFaintestMirror) {
+      continue;
+    }
+    out[i] *= 1.0F - share;
+    const int rays = mirror_rays(share, look.rays_a_pixel);
+    if (look.order[i] >= rays) {
+      continue;
+    }
+    weight[i] = share * static_cast<float>(look.rays_a_pixel) / static_cast<float>(rays);
     valid[i] = -1;
-    const float roughness = surfaces[i].material->roughness;
+    any = true;
     const std::uint64_t key = subkey(look.key, i);
     const Vector3f tilt{to_normal(key), to_normal(scramble(key)), to_normal(scramble(key + 1))};
-    const Vector3f normal = (surfaces[i].normal + roughness * tilt).normalized();
+    const Vector3f normal = (Vector3f{seen.normal_x[i], seen.normal_y[i], seen.normal_z[i]} +
+                             seen.material[i]->roughness * tilt)
+                                .normalized();
     const Vector3f incoming = direction_of(packet, i).normalized();
-    const Vector3f outgoing = incoming - 2.0F * incoming.dot(normal) * normal;
-    mirrored.ray.org_x[i] = surfaces[i].point.x();
-    mirrored.ray.org_y[i] = surfaces[i].point.y();
-    mirrored.ray.org_z[i] = surfaces[i].point.z();
-    mirrored.ray.dir_x[i] = outgoing.x();
-    mirrored.ray.dir_y[i] = outgoing.y();
-    mirrored.ray.dir_z[i] = outgoing.z();
+    aim(mirrored, i, end_of(packet, i), incoming - 2.0F * incoming.dot(normal) * normal);
     mirrored.ray.time[i] = packet.ray.time[i];
   }
+  if (!any) {
+    return;
+  }
   rays_->trace(valid, mirrored);
+  const Surfaces image =
+      surfaces(valid, mirrored,
+               {.footprint_per_t = 2.0F * look.footprint_per_t, .rays_a_pixel = look.rays_a_pixel});
   for (std::size_t i = 0; i < kPacket; ++i) {
     if (valid[i] == 0) {
       continue;
     }
-    const Surface seen = surface(
-        mirrored, i,
-        {.footprint_per_t = 2.0F * look.footprint_per_t, .spread = look.spread, .quickly = true});
-    Rgb light =
-        seen.material == nullptr ? lighting_->sky(direction_of(mirrored, i)) : diffuse(seen);
-    const float share = mirror_reflectance(surfaces[i]);
+    Rgb light = light_of(image, mirrored, i);
+    const float share = mirror_reflectance(*seen.material[i], seen.cosine[i]);
     // A lamp's image on a rough mirror is a patch of glints. One ray of a few would make a spark of
     // each: it counts at most as much as blinds the sensor.
-    const float white = luminance(surfaces[i].irradiance) * kInversePi;
+    const float white = luminance(seen.irradiance[i]) * kInversePi;
     const float brightness = luminance(light);
     light *= std::min(1.0F, kBrightestGlint * white / std::max(brightness * share, kFaintest_nit));
-    out[i] = out[i] * (1.0F - share) + light * share;
+    out[i] += light * weight[i];
   }
 }
 

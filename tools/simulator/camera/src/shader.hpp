@@ -5,22 +5,26 @@
 #include <cstdint>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/lighting.hpp"
 #include "src/ray_scene.hpp"
 
 namespace geoflow::simulator {
 
-/// What a camera sees of the place where a ray ends.
-struct Surface {
-  const Material* material = nullptr;  ///< null: the sky
-  Rgb albedo{};                        ///< with texture
-  Rgb irradiance{};                    ///< [lux]
-  Eigen::Vector3f point = Eigen::Vector3f::Zero();
-  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< towards the viewer
-  float cosine = 1;                                   ///< of the angle between normal and ray
-  float contrast = 0;                                 ///< Texture::contrast(), if looked for
+/// What a camera sees of the places where a packet's rays end.
+struct Surfaces {
+  /// Null: the sky, or a lane that does not count; its other members say nothing.
+  std::array<const Material*, kPacket> material{};
+  LaneColours albedo{};      ///< with texture
+  LaneColours irradiance{};  ///< [lux]
+  Lanes normal_x{};          ///< unit, towards the viewer
+  Lanes normal_y{};
+  Lanes normal_z{};
+  Lanes cosine{};    ///< of the angle between normal and ray
+  Lanes contrast{};  ///< Texture::contrast(), if looked for
 };
 
 /// Light that comes back along rays. Moving the people is for one thread; all else is const and
@@ -34,19 +38,23 @@ class Shader {
 
   /// How a packet's rays are to be looked at.
   struct Look {
-    float footprint_per_t =
-        0;             ///< length on a surface that faces the camera, a unit of the ray's parameter
-    float spread = 1;  ///< rays a pixel: how much finer each looks across a slanted surface
+    /// Length on a surface that faces the camera, a unit of the ray's parameter.
+    float footprint_per_t = 0;
+    /// Of which each sees a finer part, also across a slanted surface.
+    int rays_a_pixel = 1;
+    float dither = 0.5F;    ///< of Texture::sample()
     std::uint64_t key = 0;  ///< of the mirrors' roughness
-    bool quickly = false;   ///< coarser textures, for mirror images
-    bool contrast = false;  ///< Surface::contrast is wanted
+    bool contrast = false;  ///< Surfaces::contrast is wanted
+    /// The ray's number among its pixel's in some order that differs between pixels. A faint mirror
+    /// image is seen by the first ones alone, which count for the others.
+    std::array<int, kPacket> order{};
   };
   /// Luminance [cd/m^2] seen by each valid lane of a traced packet.
-  void shade(const std::array<int, kPacket>& valid, const RayPacket& packet, const Look& look,
-             std::array<Rgb, kPacket>& out) const;
+  void shade(const Valid& valid, const RayPacket& packet, const Look& look, LaneColours& out) const;
 
-  /// The surface that a lane hit.
-  [[nodiscard]] Surface surface(const RayPacket& packet, std::size_t lane, const Look& look) const;
+  /// The surfaces that the valid lanes hit.
+  [[nodiscard]] Surfaces surfaces(const Valid& valid, const RayPacket& packet,
+                                  const Look& look) const;
 
   /// The sun's illuminance [lux] on a plane that faces it; 0 indoors.
   [[nodiscard]] float sun_lux() const noexcept {
@@ -54,7 +62,7 @@ class Shader {
   }
 
   /// Mirror reflectance at that angle (Schlick, "An inexpensive BRDF model", 1994).
-  [[nodiscard]] static float mirror_reflectance(const Surface& surface) noexcept;
+  [[nodiscard]] static float mirror_reflectance(const Material& material, float cosine) noexcept;
 
  private:
   struct Person {
@@ -62,11 +70,28 @@ class Shader {
     Eigen::Vector2f shadow;  ///< from the feet to the head's shadow [m]
     LightCube light;
   };
-  void look_at_patch(std::size_t index, const Look& look, float t, Surface& surface) const;
-  [[nodiscard]] float person_shadow(const Eigen::Vector3f& point) const;
-  [[nodiscard]] static Rgb diffuse(const Surface& surface) noexcept;
-  void add_mirrors(const std::array<Surface, kPacket>& surfaces, const RayPacket& packet,
-                   const Look& look, std::array<Rgb, kPacket>& out) const;
+  /// Where a packet's rays meet the plane of a patch.
+  struct Hits {
+    Lanes x{};  ///< [m] in world
+    Lanes y{};
+    Lanes z{};
+    Lanes u{};  ///< [m] on the patch
+    Lanes v{};
+    Lanes footprint{};  ///< [m] that a ray sees
+    Lanes cosine{};
+    float facing = 1;  ///< times the patch's normal: towards the viewer
+  };
+  [[nodiscard]] static Hits meet(const Patch& patch, const RayPacket& packet, const Look& look,
+                                 std::size_t lane);
+  void look_at_patch(std::size_t index, const Valid& lanes, const RayPacket& packet,
+                     const Look& look, Surfaces& seen) const;
+  void look_at_round(std::size_t lane, const RayPacket& packet, Surfaces& seen) const;
+  void paint(const Patch& patch, const Hits& hits, const Look& look, LaneColours& albedo,
+             Lanes& contrast) const;
+  void dim_by_people(const Hits& hits, LaneColours& irradiance) const;
+  [[nodiscard]] Rgb light_of(const Surfaces& seen, const RayPacket& packet, std::size_t lane) const;
+  void add_mirrors(const Surfaces& seen, const RayPacket& packet, const Look& look,
+                   LaneColours& out) const;
 
   const Scene* scene_;
   const RayScene* rays_;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 
 #include <tbb/parallel_for.h>
@@ -17,7 +16,7 @@ static_assert(kTile * kTile == kPacket);
 struct Tile {
   int left = 0;
   int top = 0;
-  std::array<int, kPacket> valid{};
+  Valid valid{};
 
   [[nodiscard]] int x(std::size_t lane) const noexcept {
     return left + static_cast<int>(lane) % kTile;
@@ -27,10 +26,12 @@ struct Tile {
   }
 };
 
-/// Calls `visit(tile)` for all tiles of a width x height image, rows of tiles in parallel.
-template <typename Visit>
-void for_each_tile(int width, int height, const Visit& visit) {
+/// Takes a width x height image in rows of tiles, in parallel: `prepare(top)` is called for each
+/// row of tiles, and what it returns for each tile of it.
+template <typename Prepare>
+void for_each_tile_row(int width, int height, const Prepare& prepare) {
   tbb::parallel_for(0, (height + kTile - 1) / kTile, [&](int row) {
+    const auto visit = prepare(row * kTile);
     for (int left = 0; left < width; left += kTile) {
       Tile tile{.left = left, .top = row * kTile};
       for (std::size_t i = 0; i < kPacket; ++i) {
@@ -39,6 +40,12 @@ void for_each_tile(int width, int height, const Visit& visit) {
       visit(tile);
     }
   });
+}
+
+/// Calls `visit(tile)` for all tiles of a width x height image, rows of tiles in parallel.
+template <typename Visit>
+void for_each_tile(int width, int height, const Visit& visit) {
+  for_each_tile_row(width, height, [&](int) { return [&](const Tile& tile) { visit(tile); }; });
 }
 
 }  // namespace geoflow::simulator

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/tools/simulator/camera.hpp"
 
 #include "src/ray_scene.hpp"
 
@@ -36,6 +38,29 @@ struct Pinhole {
   [[nodiscard]] Eigen::Vector3f direction(float x, float y) const {
     return {(x - cx) * inverse_fx, (y - cy) * inverse_fy, 1.0F};
   }
+};
+
+/// A camera's way over some time: views at even steps of half a millisecond or less, linear
+/// between them. Of a turn that speeds up by 200 rad/s^2, as when a foot hits the ground, that is
+/// within 6e-6 rad.
+class ViewTrack {
+ public:
+  ViewTrack(double begin_s, double end_s, const PoseAt& T_world_cam);
+
+  /// The view at a time, or at the nearer end.
+  [[nodiscard]] View at(double t_s) const;
+
+  /// The largest motion between two views that are at most `duration_s` apart.
+  struct Motion {
+    float turn_rad = 0;
+    float shift_m = 0;
+  };
+  [[nodiscard]] Motion largest_motion(double duration_s) const;
+
+ private:
+  double begin_s_;
+  double step_s_;
+  std::vector<View> views_;
 };
 
 /// Aims one lane of a packet.

@@ -5,16 +5,16 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 
 namespace geoflow::simulator {
 namespace {
 
 constexpr float kLargestCode = 255.0F;
-constexpr unsigned kByte = 8;
+constexpr int kByte = 8;
 constexpr std::size_t kContrastOctaves = 3;
 
 std::vector<Rgb> halved(const std::vector<Rgb>& pixels, std::size_t side) {
@@ -44,21 +44,19 @@ float luminance_variance(const std::vector<Rgb>& pixels) {
   return static_cast<float>(std::max(0.0, squares / count - mean * mean));
 }
 
-/// The four bytes of a texel as numbers, the lowest first.
-Rgb decode(std::uint32_t texel) noexcept {
-  using Bytes = std::uint8_t __attribute__((vector_size(4)));
-  return __builtin_convertvector(std::bit_cast<Bytes>(texel), Rgb);
-}
-
-int to_cell(float coordinate) noexcept {
-  const int truncated = static_cast<int>(coordinate);
-  return truncated - (coordinate < static_cast<float>(truncated) ? 1 : 0);
+/// The bytes of a texel as numbers, each where it stands: times 1, 2^8, 2^16.
+[[gnu::always_inline]] inline Rgb decode(std::uint32_t texel) noexcept {
+  using Words = std::uint32_t __attribute__((vector_size(16)));
+  using Integers = std::int32_t __attribute__((vector_size(16)));
+  constexpr Words kBytes{0xff, 0xff00, 0xff0000, 0};
+  const Words all{texel, texel, texel, texel};
+  return __builtin_convertvector(std::bit_cast<Integers>(all & kBytes), Rgb);
 }
 
 }  // namespace
 
 Texture::Texture(const std::vector<Rgb>& pixels, int side, float length_m, Repeat repeat)
-    : length_m_{length_m}, inverse_length_{1.0F / length_m}, repeat_{repeat} {
+    : length_m_{length_m}, inverse_length_{1.0F / length_m}, repeat_{repeat}, side_{side} {
   constexpr float kSmallestUnit = 1e-6F;
   Rgb largest{};
   for (const Rgb& pixel : pixels) {
@@ -66,25 +64,29 @@ Texture::Texture(const std::vector<Rgb>& pixels, int side, float length_m, Repea
       largest[c] = std::max(largest[c], pixel[c]);
     }
   }
+  Rgb unit{};
   for (int c = 0; c < 3; ++c) {
-    unit_[c] = std::max(largest[c], kSmallestUnit) / kLargestCode;
+    unit[c] = std::max(largest[c], kSmallestUnit) / kLargestCode;
+    unit_[c] = std::ldexp(unit[c], -kByte * c);
   }
   std::vector<float> variances;
   std::vector<Rgb> level = pixels;
   for (int length = side; length >= 1; length /= 2) {
     variances.push_back(luminance_variance(level));
-    Level coded{.side = length, .texels = std::vector<std::uint32_t>(level.size())};
-    for (std::size_t i = 0; i < level.size(); ++i) {
+    first_.at(variances.size() - 1) = static_cast<std::uint32_t>(texels_.size());
+    for (const Rgb& pixel : level) {
+      std::uint32_t texel = 0;
       for (int c = 2; c >= 0; --c) {
-        const float code = std::clamp(level[i][c] / unit_[c] + 0.5F, 0.0F, kLargestCode);
-        coded.texels[i] = (coded.texels[i] << kByte) | static_cast<std::uint32_t>(code);
+        const float code = std::clamp(pixel[c] / unit[c] + 0.5F, 0.0F, kLargestCode);
+        texel = (texel << kByte) | static_cast<std::uint32_t>(code);
       }
+      texels_.push_back(texel);
     }
-    levels_.push_back(std::move(coded));
     if (length > 1) {
       level = halved(level, static_cast<std::size_t>(length));
     }
   }
+  last_level_ = static_cast<int>(variances.size()) - 1;
   mean_ = level.front();
   const float mean_luminance = std::max(luminance(mean_), kSmallestUnit);
   for (std::size_t i = 0; i < variances.size(); ++i) {
@@ -94,80 +96,97 @@ Texture::Texture(const std::vector<Rgb>& pixels, int side, float length_m, Repea
   }
 }
 
-Rgb Texture::bilinear(std::size_t index, float u, float v) const noexcept {
-  const Level& level = levels_[index];
-  const float side = static_cast<float>(level.side);
-  const float x = u * side - 0.5F;
-  const float y = v * side - 0.5F;
-  const int x0 = to_cell(x);
-  const int y0 = to_cell(y);
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
-  const int last = level.side - 1;
-  const auto wrap = [&](int cell) {
-    return static_cast<std::size_t>(repeat_ == Repeat::kClamp ? std::clamp(cell, 0, last)
-                                                              : cell & last);
-  };
-  const auto row_length = static_cast<std::size_t>(level.side);
-  const std::uint32_t* top = level.texels.data() + wrap(y0) * row_length;
-  const std::uint32_t* bottom = level.texels.data() + wrap(y0 + 1) * row_length;
-  const std::size_t left = wrap(x0);
-  const std::size_t right = wrap(x0 + 1);
-  return (decode(top[left]) * (1.0F - fx) + decode(top[right]) * fx) * (1.0F - fy) +
-         (decode(bottom[left]) * (1.0F - fx) + decode(bottom[right]) * fx) * fy;
-}
-
-float Texture::level_of(float footprint_m) const noexcept {
+[[gnu::always_inline]] inline float Texture::level_of(float footprint_m) const noexcept {
   // log2 from the exponent and a linear mantissa: within 0.09 of it, and continuous.
   constexpr float kMantissa = 1.0F / 8388608.0F;  // 2^-23: IEEE 754 single precision
   constexpr float kBias = 127.0F;
-  const float texels = footprint_m * inverse_length_ * static_cast<float>(levels_.front().side);
-  const float scaled =
-      static_cast<float>(std::bit_cast<std::uint32_t>(std::max(texels, 1.0F))) * kMantissa - kBias;
-  return std::min(scaled, static_cast<float>(levels_.size() - 1));
+  constexpr float kMostTexels = 1e9F;
+  const float texels =
+      held(footprint_m * inverse_length_ * static_cast<float>(side_), 1.0F, kMostTexels);
+  const float scaled = static_cast<float>(std::bit_cast<std::int32_t>(texels)) * kMantissa - kBias;
+  return std::min(scaled, static_cast<float>(last_level_));
 }
 
-void Texture::turn(float& u, float& v) const noexcept {
-  if (repeat_ != Repeat::kShuffle) {
-    return;
-  }
-  const int column = to_cell(u);
-  const int row = to_cell(v);
-  u -= static_cast<float>(column);
-  v -= static_cast<float>(row);
-  const std::uint64_t turns = subkey(static_cast<std::uint64_t>(static_cast<std::uint32_t>(column)),
-                                     static_cast<std::uint32_t>(row)) &
-                              3U;
-  if ((turns & 1U) != 0) {
-    const float old_u = u;
-    u = v;
-    v = 1.0F - old_u;
-  }
-  if ((turns & 2U) != 0) {
-    u = 1.0F - u;
-    v = 1.0F - v;
+[[gnu::always_inline]] inline void Texture::place(const Spots& spots, Lanes& u,
+                                                  Lanes& v) const noexcept {
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    u[i] = spots.u_m[i] * inverse_length_;
+    v[i] = 1.0F - spots.v_m[i] * inverse_length_;  // row 0 is the picture's top
   }
 }
 
-Rgb Texture::sample_quickly(float u_m, float v_m, float footprint_m) const noexcept {
-  float u = u_m * inverse_length_;
-  float v = 1.0F - v_m * inverse_length_;
-  turn(u, v);
-  return bilinear(static_cast<std::size_t>(level_of(footprint_m) + 0.5F), u, v) * unit_;
+void Texture::turn(Lanes& u, Lanes& v) const noexcept {
+  // Neighbouring rays mostly see the same copy.
+  int known_column = 0;
+  int known_row = 0;
+  std::uint64_t turns = subkey(0, 0) & 3U;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const int column = whole_below(u[i]);
+    const int row = whole_below(v[i]);
+    if (column != known_column || row != known_row) {
+      known_column = column;
+      known_row = row;
+      turns = subkey(static_cast<std::uint64_t>(static_cast<std::uint32_t>(column)),
+                     static_cast<std::uint32_t>(row)) &
+              3U;
+    }
+    const float across = u[i] - static_cast<float>(column);
+    const float down = v[i] - static_cast<float>(row);
+    const bool quarter = (turns & 1U) != 0;
+    const float turned_u = quarter ? down : across;
+    const float turned_v = quarter ? 1.0F - across : down;
+    const bool half = (turns & 2U) != 0;
+    u[i] = half ? 1.0F - turned_u : turned_u;
+    v[i] = half ? 1.0F - turned_v : turned_v;
+  }
 }
 
-Rgb Texture::sample(float u_m, float v_m, float footprint_m) const noexcept {
-  float u = u_m * inverse_length_;
-  float v = 1.0F - v_m * inverse_length_;  // row 0 is the picture's top
-  turn(u, v);
-  const float level = level_of(footprint_m);
-  const auto fine = static_cast<std::size_t>(level);
-  const float blend = level - static_cast<float>(fine);
-  Rgb result = bilinear(fine, u, v);
-  if (blend > 0.0F && fine + 1 < levels_.size()) {
-    result = result * (1.0F - blend) + bilinear(fine + 1, u, v) * blend;
+[[gnu::always_inline]] inline void Texture::find_taps(const Lanes& u, const Lanes& v,
+                                                      const Lanes& level,
+                                                      Taps& taps) const noexcept {
+  const bool clamps = repeat_ == Repeat::kClamp;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const int chosen = static_cast<int>(level[i]);
+    const int side = side_ >> chosen;
+    const int last = side - 1;
+    const auto wrap = [=](int cell) __attribute__((always_inline)) {
+      return clamps ? std::min(std::max(cell, 0), last) : cell & last;
+    };
+    const float x = u[i] * static_cast<float>(side) - 0.5F;
+    const float y = v[i] * static_cast<float>(side) - 0.5F;
+    const int x0 = whole_below(x);
+    const int y0 = whole_below(y);
+    taps.weigh(i, x - static_cast<float>(x0), y - static_cast<float>(y0));
+    const int first = static_cast<int>(first_[static_cast<std::size_t>(chosen)]);
+    const int top = first + wrap(y0) * side;
+    const int bottom = first + wrap(y0 + 1) * side;
+    taps.index[0][i] = static_cast<std::uint32_t>(top + wrap(x0));
+    taps.index[1][i] = static_cast<std::uint32_t>(top + wrap(x0 + 1));
+    taps.index[2][i] = static_cast<std::uint32_t>(bottom + wrap(x0));
+    taps.index[3][i] = static_cast<std::uint32_t>(bottom + wrap(x0 + 1));
   }
-  return result * unit_;
+}
+
+void Texture::sample(const Spots& spots, float dither, LaneColours& out) const noexcept {
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    Lanes u;
+    Lanes v;
+    Lanes level;
+    Taps taps;
+    place(spots, u, v);
+    if (repeat_ == Repeat::kShuffle) {
+      turn(u, v);
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      level[i] = std::min(level_of(spots.footprint_m[i]) + dither, static_cast<float>(last_level_));
+    }
+    find_taps(u, v, level, taps);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      out[i] = taps.mix(i, [&](std::uint32_t at) __attribute__((always_inline)) {
+        return decode(texels_[at]);
+      }) * unit_;
+    }
+  });
 }
 
 float Texture::contrast(float footprint_m) const noexcept {

@@ -46,6 +46,7 @@ struct CameraOptions {
   double depth_min_m = 0.28;
   double depth_max_m = 20.0;
   double projector_power = 1.0;  ///< times the infrared pattern's brightness; 0: off
+  bool depth_truth = false;      ///< Rendered::depth_truth is wanted
   // NOLINTEND(readability-magic-numbers)
 };
 
@@ -57,7 +58,7 @@ struct Rendered {
   FrameRef color;
   FrameRef depth;                  ///< kDepth16 [mm], registered to colour; 0: no measurement
   std::vector<float> depth_truth;  ///< [m] along the optical axis, width * height, of the colour
-                                   ///< view at mid exposure; 0: sky
+                                   ///< view at mid exposure; 0: sky; empty unless wanted
   double exposure_s = 0;
   double gain = 1;
 };

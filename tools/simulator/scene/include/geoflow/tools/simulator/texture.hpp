@@ -5,10 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace geoflow::simulator {
+#include "geoflow/tools/simulator/lanes.hpp"
 
-/// Linear red, green, blue and an unused fourth, for arithmetic on all at once.
-using Rgb = float __attribute__((vector_size(16)));
+namespace geoflow::simulator {
 
 /// The luminance of linear sRGB primaries (ITU-R BT.709).
 [[nodiscard]] constexpr float luminance(const Rgb& colour) noexcept {
@@ -37,34 +36,38 @@ class Texture {
   [[nodiscard]] float length_m() const noexcept { return length_m_; }
   [[nodiscard]] const Rgb& mean() const noexcept { return mean_; }
 
-  /// The reflectance about a point (u, v) [m] on the surface, averaged over about `footprint_m`.
-  /// Bilinear in the two levels around that size.
-  [[nodiscard]] Rgb sample(float u_m, float v_m, float footprint_m) const noexcept;
-
-  /// The same from the nearest level alone: for faint overlays and for mirror images, where steps
-  /// between levels do not show.
-  [[nodiscard]] Rgb sample_quickly(float u_m, float v_m, float footprint_m) const noexcept;
+  /// Points on the surface, and the size of what a ray sees there.
+  struct Spots {
+    Lanes u_m{};
+    Lanes v_m{};
+    Lanes footprint_m{};
+  };
+  /// The reflectance about each spot, averaged over about its footprint: bilinear in one of the two
+  /// levels around that size. `dither` in 0 … 1 decides which: the mean over evenly spread ones is
+  /// linear between the levels, 0.5 takes the nearer one. u and v must be within 1e6 sides.
+  void sample(const Spots& spots, float dither, LaneColours& out) const noexcept;
 
   /// Standard deviation of the luminance over its mean, of the structure between `footprint_m` and
   /// 8 times that size: what a window of about 8 x 8 pixels sees of the texture.
   [[nodiscard]] float contrast(float footprint_m) const noexcept;
 
  private:
-  struct Level {
-    int side = 0;
-    std::vector<std::uint32_t> texels;  ///< 8 bits each of r, g, b in units of unit_
-  };
+  static constexpr std::size_t kMostLevels = 16;
 
-  [[nodiscard]] Rgb bilinear(std::size_t level, float u, float v) const noexcept;
   [[nodiscard]] float level_of(float footprint_m) const noexcept;
-  void turn(float& u, float& v) const noexcept;
+  void place(const Spots& spots, Lanes& u, Lanes& v) const noexcept;
+  void turn(Lanes& u, Lanes& v) const noexcept;
+  void find_taps(const Lanes& u, const Lanes& v, const Lanes& level, Taps& taps) const noexcept;
 
   float length_m_;
   float inverse_length_;
   Repeat repeat_;
-  Rgb unit_{};
+  int side_;
+  int last_level_ = 0;
+  Rgb unit_{};  ///< reflectance of a texel's masked bits, as numbers
   Rgb mean_{};
-  std::vector<Level> levels_;
+  std::vector<std::uint32_t> texels_;               ///< level after level, 8 bits each of r, g, b
+  std::array<std::uint32_t, kMostLevels> first_{};  ///< of each level in texels_
   std::vector<float> contrasts_;
 };
 

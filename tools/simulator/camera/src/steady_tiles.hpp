@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "src/ray_scene.hpp"
+#include "src/tiles.hpp"
+#include "src/view.hpp"
+
+namespace geoflow::simulator {
+
+/// When each row of a rolling shutter is open.
+struct Shutter {
+  double t_mid_s = 0;  ///< the middle of the middle row's exposure
+  double exposure_s = 0;
+  double readout_s = 0;
+  int rows = 0;
+
+  [[nodiscard]] double row_mid_s(int row) const noexcept {
+    return t_mid_s +
+           readout_s * ((static_cast<double>(row) + 0.5) / static_cast<double>(rows) - 0.5);
+  }
+  [[nodiscard]] double begin_s() const noexcept { return t_mid_s - 0.5 * (exposure_s + readout_s); }
+  [[nodiscard]] double end_s() const noexcept { return t_mid_s + 0.5 * (exposure_s + readout_s); }
+};
+
+/// Which tiles of an image see one patch and nothing else during a whole exposure. Their rays need
+/// no tracing: they end where they meet the patch's plane.
+///
+/// One ray a pixel is traced at the middle of its row's exposure. Whatever is seen there stays
+/// within its reach during the exposure: how far the camera's turn and shift, at that depth, and a
+/// walker's own motion move it over the image. A tile is steady if all reaches that touch it are of
+/// the same patch, and its own does not leave the image. What is thinner than a pixel may be
+/// missed, as it may be by any pixel's rays.
+class SteadyTiles {
+ public:
+  static constexpr int kMixed = -1;
+  static constexpr int kSky = -2;
+
+  SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shutter& shutter, int width,
+              const ViewTrack& track);
+
+  /// The patch that all of a tile's rays meet, or kSky, or kMixed.
+  [[nodiscard]] int at(const Tile& tile) const noexcept {
+    return seen_[index(tile.left / kTile, tile.top / kTile)];
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int column, int row) const noexcept {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
+  void look(const RayScene& rays, const Pinhole& pinhole, const Shutter& shutter, int width,
+            const ViewTrack& track);
+  void spread();
+
+  int columns_;
+  int rows_;
+  std::vector<int> centre_;  ///< what each tile sees in the middle of its exposure
+  std::vector<int> reach_;   ///< in tiles each way
+  std::vector<int> seen_;
+};
+
+}  // namespace geoflow::simulator
