@@ -64,6 +64,8 @@ class Core::Impl {
     if (map_.keyframes().empty()) {
       return start(packet);
     }
+    since_keyframe_ =
+        motion && since_keyframe_ ? std::optional{*since_keyframe_ * *motion} : std::nullopt;
     return follow(packet, motion);
   }
 
@@ -210,22 +212,34 @@ class Core::Impl {
   [[nodiscard]] bool needs_keyframe(const SyncedPacket& packet, const TrackingResult& result,
                                     const SE3& T_odom_cam) const {
     const Keyframe& reference = map_.keyframe(reference_);
+    // Where nothing but the features has changed, a new view tells nothing new.
+    constexpr double kSameViewM = 0.03;
+    constexpr double kSameViewRad = 0.03;
     const Vector6d moved = (reference.T_odom_cam.inverse() * T_odom_cam).log();
+    const bool new_view =
+        moved.tail<3>().norm() > kSameViewM || moved.head<3>().norm() > kSameViewRad;
     const double share = static_cast<double>(result.solution.visual_inliers) /
                          static_cast<double>(reference.points.size() + 1);
     return moved.tail<3>().norm() > config_.keyframes.translation_m ||
            moved.head<3>().norm() > config_.keyframes.rotation_rad ||
-           share < config_.keyframes.overlap / 2 ||
-           (result.depth_share > kDepthCarriesOn && result.overlap < config_.keyframes.overlap) ||
+           (new_view && share < config_.keyframes.overlap / 2) ||
+           (new_view && result.depth_share > kDepthCarriesOn &&
+            result.overlap < config_.keyframes.overlap) ||
            packet.t - reference.t > config_.keyframes.maximum_interval;
   }
 
   void insert_keyframe(const Matrix6d& covariance) {
     const StageScope scope{observer_, Stage::kKeyframe};
+    const KeyframeId before = reference_;
     reference_ = builder_.insert(map_, tracker_.current(), covariance);
     if (map_.keyframes().size() > 1) {
       pending_ = reference_;
+      if (since_keyframe_) {
+        map_.add_edge({before, reference_, since_keyframe_->T_cam0_cam1,
+                       since_keyframe_->covariance.inverse()});
+      }
     }
+    since_keyframe_.emplace();
   }
 
   Config config_;
@@ -239,6 +253,7 @@ class Core::Impl {
   Map map_;
   KeyframeId reference_{};
   std::optional<KeyframeId> pending_;
+  std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
   std::vector<FrameRecord> records_;
   PoseEstimate last_;
   SE3 T_odom_cam_;                     ///< of the last frame

@@ -54,6 +54,7 @@ using Event = std::variant<Arrival<CameraClock, EncodedImage>, Arrival<ImuClock,
 struct FoundCalibration {
   std::optional<CameraIntrinsics> camera{};
   std::optional<double> depth_unit_m{};
+  std::optional<DepthAlignment> depth_alignment{};
   std::optional<SE3> T_cam_imu{};
   std::optional<Duration> timeshift_cam_imu{};
   std::optional<ImuNoise> imu_noise{};

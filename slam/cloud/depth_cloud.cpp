@@ -19,8 +19,26 @@ namespace geoflow::slam {
 namespace {
 
 /// What is summed over the rows of a cell, for each image column. q: inverse depth less the
-/// column's reference; v: row less the cell's middle row; only pixels with depth count.
-enum Column : std::size_t { kReference, kCount, kV, kVV, kQ, kQV, kQQ, kMask, kRowQ, kColumnSums };
+/// column's reference; v: row less the cell's middle row; only pixels with depth count. The steps
+/// are those of q to the next pixel in its row and in its column, without their sign.
+enum Column : std::size_t {
+  kReference,
+  kCount,
+  kV,
+  kVV,
+  kQ,
+  kQV,
+  kQQ,
+  kStepsAlong,
+  kStepsDown,
+  kCountAlong,
+  kCountDown,
+  kMask,
+  kRowQ,
+  kMaskAbove,
+  kRowQAbove,
+  kColumnSums
+};
 
 /// A square of side s has variance s^2 / 12 about its middle.
 constexpr double kSquareVariance = 12.0;
@@ -28,15 +46,6 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 /// Least determinant of a cell's pixels' scatter, relative to its diagonal.
 constexpr double kMinPixelSpread = 1e-3;
 constexpr double kPlaneParameters = 3.0;
-
-/// A neighbour belongs to a cell's surface when it is within this many sigmas of a pixel from the
-/// cell's own plane, whose slope is uncertain; the joint fit decides.
-constexpr float kNeighbourSigmas = 4.0F;
-/// Cells, the middle one included, that a joint plane takes.
-constexpr float kMinNeighbourhood = 5.0F;
-/// Least determinant of the cells' scatter, relative to its diagonal: they must not lie on one
-/// line.
-constexpr float kMinSpread = 0.05F;
 
 /// Depth that is used [counts], and counts of 1 / (1 m).
 struct DepthLimits {
@@ -83,44 +92,16 @@ void add_inverse_depth(const float* __restrict q, std::size_t width, float v,
   }
 }
 
-/// Least-squares plane q = offset + slope . ray through the points of neighbouring cells.
-struct PlaneFit {
-  float count = 0;
-  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-  Eigen::Matrix2f products = Eigen::Matrix2f::Zero();
-  Eigen::Vector2f with_q = Eigen::Vector2f::Zero();
-  float sum_q = 0;
-  float squares = 0;  ///< of q; after solve() of the residuals
-  Eigen::Vector2f slope = Eigen::Vector2f::Zero();
-  Eigen::Vector2f spread = Eigen::Vector2f::Zero();  ///< sums of squares about the mean ray
-
-  void add(const Eigen::Vector2f& ray, float q) {
-    count += 1.0F;
-    sum += ray;
-    products += ray * ray.transpose();
-    with_q += q * ray;
-    sum_q += q;
-    squares += q * q;
+/// Between each pixel and the other one at the same place of its array.
+void add_steps(const float* __restrict mask, const float* __restrict q,
+               const float* __restrict other_mask, const float* __restrict other_q,
+               std::size_t width, float* __restrict steps, float* __restrict count) {
+  for (std::size_t x = 0; x < width; ++x) {
+    const float both = mask[x] * other_mask[x];
+    steps[x] += both * std::abs(other_q[x] - q[x]);
+    count[x] += both;
   }
-
-  /// False where the cells are too few or on one line.
-  bool solve() {
-    if (count < kMinNeighbourhood) {
-      return false;
-    }
-    const Eigen::Matrix2f scatter = products - sum * sum.transpose() / count;
-    const Eigen::Vector2f right = with_q - sum * (sum_q / count);
-    spread = scatter.diagonal();
-    const float determinant = scatter(0, 0) * scatter(1, 1) - scatter(0, 1) * scatter(0, 1);
-    if (determinant < kMinSpread * spread.prod()) {
-      return false;
-    }
-    slope.x() = (scatter(1, 1) * right.x() - scatter(0, 1) * right.y()) / determinant;
-    slope.y() = (scatter(0, 0) * right.y() - scatter(0, 1) * right.x()) / determinant;
-    squares -= sum_q * sum_q / count + slope.dot(right);
-    return true;
-  }
-};
+}
 
 }  // namespace
 
@@ -129,13 +110,21 @@ struct DepthCloud::Sums {
   float reference = 0;
   float n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0;
   float q = 0, qu = 0, qv = 0, qq = 0;
+  float steps_along = 0, steps_down = 0, count_along = 0, count_down = 0;
+
+  /// By how much the nearest of two neighbours is nearer than their mean, along and down: half the
+  /// mean step. 0 unless the steps were summed.
+  [[nodiscard]] float nearest_bias() const noexcept {
+    return 0.5F *
+           (steps_along / std::max(count_along, 1.0F) + steps_down / std::max(count_down, 1.0F));
+  }
 };
 
-DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m,
+DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, const Pixels& pixels,
                        const DepthCloudConfig& config)
     : grid_{std::move(grid)},
       config_{config},
-      unit_m_{static_cast<float>(depth_unit_m)},
+      pixels_{pixels},
       tangent_scale_{
           static_cast<float>(grid_->cell_px() * grid_->cell_px() /
                              (kSquareVariance * grid_->camera().fx * grid_->camera().fy))},
@@ -170,6 +159,8 @@ Result<void> DepthCloud::build(const FrameRef& depth) {
       }
     }
   }
+  drop_edges();
+  measure_noise();
   smooth_normals();
   return {};
 }
@@ -186,9 +177,11 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
   float* const sum_q = columns_.data() + kQ * width;
   float* const sum_qv = columns_.data() + kQV * width;
   float* const sum_qq = columns_.data() + kQQ * width;
-  const float to_counts = 1.0F / unit_m_;
-  float* const mask = columns_.data() + kMask * width;
-  float* const q = columns_.data() + kRowQ * width;
+  const auto to_counts = static_cast<float>(1.0 / pixels_.unit_m);
+  float* mask = columns_.data() + kMask * width;
+  float* q = columns_.data() + kRowQ * width;
+  float* mask_above = columns_.data() + kMaskAbove * width;
+  float* q_above = columns_.data() + kRowQAbove * width;
   const auto to_int = [&](double depth_m) {
     constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
     return static_cast<std::int32_t>(
@@ -214,6 +207,16 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
     convert(pixels, width, limits, reference, mask, q);
     add_mask(mask, width, v, count, sum_v, sum_vv);
     add_inverse_depth(q, width, v, sum_q, sum_qv, sum_qq);
+    if (pixels_.alignment == DepthAlignment::kNearestTouching) {
+      add_steps(mask, q, mask + 1, q + 1, width - 1, columns_.data() + kStepsAlong * width,
+                columns_.data() + kCountAlong * width);
+      if (i > 0) {
+        add_steps(mask, q, mask_above, q_above, width, columns_.data() + kStepsDown * width,
+                  columns_.data() + kCountDown * width);
+      }
+      std::swap(mask, mask_above);
+      std::swap(q, q_above);
+    }
   }
 }
 
@@ -241,6 +244,12 @@ DepthCloud::Sums DepthCloud::sums_of_cell(int column) const noexcept {
     sums.qu += q * u;
     sums.qv += at(kQV, i);
     sums.qq += at(kQQ, i);
+    sums.steps_down += at(kStepsDown, i);
+    sums.count_down += at(kCountDown, i);
+    if (i + 1 < px) {  // the last one's neighbour has another reference
+      sums.steps_along += at(kStepsAlong, i);
+      sums.count_along += at(kCountAlong, i);
+    }
   }
   return sums;
 }
@@ -267,16 +276,11 @@ Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcep
   }
   const Eigen::Vector2d slope{(vv * qu - uv * qv) / determinant, (uu * qv - uv * qu) / determinant};
   const double squares = wide(sums.qq) - n * q * q - slope.x() * qu - slope.y() * qv;
-  const double variance = std::max(squares, 0.0) / std::max(n - kPlaneParameters, 1.0);
-  const double sigma2 = config_.inverse_depth_sigma * config_.inverse_depth_sigma;
-  if (variance > config_.max_plane_rms * config_.max_plane_rms * sigma2) {
-    return {};
-  }
   // A plane n . X = 1 has q = n . ray: n is (g, q - g . ray) with g the slope of q in the ray's
   // coordinates. A change e of q moves the point by z e / |n| along the normal.
   const Eigen::Vector2d at =
       ray.centre.cast<double>() + ray.per_pixel.cast<double>() * Eigen::Vector2d{u, v};
-  const double inverse_depth = q + wide(sums.reference);
+  const double inverse_depth = q + wide(sums.reference) - wide(sums.nearest_bias());
   const Eigen::Vector2d g = ray.per_pixel.cast<double>().inverse().transpose() * slope;
   const Eigen::Vector3d plane{g.x(), g.y(), inverse_depth - g.dot(at)};
   const double norm = plane.norm();
@@ -284,69 +288,14 @@ Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcep
   if (inverse_depth < static_cast<double>(min_cosine_) * norm * std::sqrt(1.0 + at.squaredNorm())) {
     return {};
   }
-  const double independent = std::max(1.0, n / config_.correlated_pixels);
   Surfel surfel;
   surfel.point = (z * at.homogeneous()).cast<float>();
   surfel.normal = (-plane / norm).cast<float>();
-  surfel.normal_variance =
-      static_cast<float>(z * z * std::max(variance, sigma2) / (norm * norm * independent));
+  // Until smooth_normals() and measure_noise(): valid, and the pixels' variance about their plane.
+  surfel.normal_variance = 1;
   surfel.tilt_variance =
-      surfel.normal_variance / (tangent_scale_ * surfel.point.z() * surfel.point.z());
+      static_cast<float>(std::max(squares, 0.0) / std::max(n - kPlaneParameters, 1.0));
   return surfel;
-}
-
-/// A cell is too small for a good normal. Where its neighbours continue its surface, the plane
-/// through all their points (again: inverse depth linear in the ray) has a slope several times more
-/// certain.
-void DepthCloud::smooth_normals() {
-  smoothed_.clear();
-  for (const std::uint32_t cell : valid_) {
-    smoothed_.push_back(smoothed_normal(cell));
-  }
-  for (std::size_t i = 0; i < valid_.size(); ++i) {
-    surfels_[valid_[i]].normal = smoothed_[i].head<3>();
-    surfels_[valid_[i]].tilt_variance = smoothed_[i].w();
-  }
-}
-
-Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
-  const Surfel& centre = surfels_[cell];
-  Eigen::Vector4f own{centre.normal.x(), centre.normal.y(), centre.normal.z(),
-                      centre.tilt_variance};
-  const float q0 = 1.0F / centre.point.z();
-  const Eigen::Vector2f ray0 = q0 * centre.point.head<2>();
-  const Eigen::Vector2f slope = centre.normal.head<2>() / centre.normal.dot(centre.point);
-  const auto sigma = static_cast<float>(config_.inverse_depth_sigma);
-  const int columns = grid_->columns();
-  const int column = static_cast<int>(cell) % columns;
-  const int row = static_cast<int>(cell) / columns;
-  PlaneFit plane;
-  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_->rows() - 1); ++r) {
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
-      const Surfel& other =
-          surfels_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
-                   static_cast<std::size_t>(c)];
-      if (!other.valid()) {
-        continue;
-      }
-      const float other_q = 1.0F / other.point.z();
-      const Eigen::Vector2f ray = other_q * other.point.head<2>() - ray0;
-      if (std::abs(other_q - q0 - slope.dot(ray)) <= kNeighbourSigmas * sigma) {
-        plane.add(ray, other_q - q0);
-      }
-    }
-  }
-  if (!plane.solve() ||
-      plane.squares > (plane.count - static_cast<float>(kPlaneParameters)) * sigma * sigma) {
-    return own;  // alone, curved, or a fold
-  }
-  const Eigen::Vector3f normal{plane.slope.x(), plane.slope.y(), q0 - plane.slope.dot(ray0)};
-  const float z2 = centre.point.z() * centre.point.z();
-  Eigen::Vector4f result;
-  result.head<3>() = -normal.normalized();
-  result.w() =
-      std::min(centre.tilt_variance, centre.normal_variance / (z2 * plane.spread.minCoeff()));
-  return result;
 }
 
 }  // namespace geoflow::slam

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 
@@ -21,19 +22,15 @@ struct DepthCloudConfig {
   int cell_px = 8;            ///< side of a cell [px]
   double min_depth_m = 0.25;  ///< nearer pixels are not used
   double max_depth_m = 8.0;   ///< farther pixels are not used
-  /// Standard deviation of one pixel's inverse depth [1/m], the same at every depth for a
-  /// triangulating sensor: sigma(z) = this * z^2. Kinect v1: 1.425e-3 (Khoshelham & Elberink,
-  /// "Accuracy and resolution of Kinect depth data", 2012, eq. 11); D435: about 2e-3 to 4e-3
-  /// (subpixel 0.05 to 0.08 px of f = 384 px and a baseline of 50 mm; Intel, "Tuning D4xx depth
-  /// cameras", 2019). Noise that a cell's own pixels show to be larger replaces it.
-  double inverse_depth_sigma = 1.5e-3;
-  /// Neighbouring pixels share the matching window, so their noise is correlated: this many count
-  /// as one.
-  double correlated_pixels = 16.0;
+  /// Least standard deviation of a cell's inverse depth that is believed [1/m].
+  double least_sigma = 3e-4;
   double min_fill = 0.6;  ///< least part of a cell's pixels with depth
-  /// A cell whose pixels miss their plane by more than this many inverse_depth_sigma (rms) is an
-  /// edge, not a surface.
+  /// A cell whose pixels miss their plane by more than this many times what most cells' do (rms) is
+  /// an edge, not a surface.
   double max_plane_rms = 3.0;
+  /// A normal is taken from as many rings of neighbouring cells as make it this certain [rad], if
+  /// they continue the surface.
+  double normal_sigma_rad = 0.015;
   double max_incidence_deg = 78.0;  ///< a steeper view of the surface is rejected
 };
 // NOLINTEND(readability-magic-numbers)
@@ -55,8 +52,14 @@ struct Surfel {
 /// several threads is fine.
 class DepthCloud {
  public:
-  /// `depth_unit_m`: metres per count of a pixel. The grid's cell size must be config.cell_px.
-  DepthCloud(std::shared_ptr<const CellGrid> grid, double depth_unit_m,
+  /// What a depth image's numbers mean.
+  struct Pixels {
+    double unit_m;  ///< metres per count
+    DepthAlignment alignment = DepthAlignment::kExact;
+  };
+
+  /// The grid's cell size must be config.cell_px.
+  DepthCloud(std::shared_ptr<const CellGrid> grid, const Pixels& pixels,
              const DepthCloudConfig& config);
 
   /// Replaces the content by that of a kDepth16 image of the camera's size; anything else is
@@ -65,6 +68,10 @@ class DepthCloud {
   [[nodiscard]] Result<void> build(const FrameRef& depth);
 
   [[nodiscard]] const CellGrid& grid() const noexcept { return *grid_; }
+  /// Standard deviation of a surfel's inverse depth [1/m], as the image shows it: the same at every
+  /// depth for a triangulating sensor. Kinect v1: about 1e-3; D435: 2e-3 to 5e-3.
+  [[nodiscard]] float sigma() const noexcept { return sigma_; }
+  [[nodiscard]] const Pixels& pixels() const noexcept { return pixels_; }
   [[nodiscard]] const DepthCloudConfig& config() const noexcept { return config_; }
   /// One entry a cell, row by row; see Surfel::valid().
   [[nodiscard]] std::span<const Surfel> surfels() const noexcept { return surfels_; }
@@ -80,15 +87,19 @@ class DepthCloud {
   void accumulate_row_of_cells(const FrameRef& depth, int cell_row);
   [[nodiscard]] Sums sums_of_cell(int column) const noexcept;
   [[nodiscard]] Surfel fit(const Sums& sums, const CellGrid::Ray& ray) const noexcept;
+  void drop_edges();
+  void measure_noise();
   void smooth_normals();
   [[nodiscard]] Eigen::Vector4f smoothed_normal(std::uint32_t cell) const noexcept;
 
   std::shared_ptr<const CellGrid> grid_;
   DepthCloudConfig config_;
-  float unit_m_;
+  Pixels pixels_;
   float tangent_scale_;  ///< see tangent_scale()
   float min_cosine_;     ///< of the angle of incidence
+  float sigma_ = 0;      ///< see sigma()
   std::vector<Surfel> surfels_;
+  std::vector<float> scratch_;
   std::vector<std::uint32_t> valid_;
   std::vector<Eigen::Vector4f> smoothed_;  ///< normal and tilt variance of each valid surfel
   std::vector<float> columns_;             ///< sums over a row of cells for each image column

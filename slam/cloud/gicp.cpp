@@ -93,6 +93,21 @@ void finish(const NormalEquations& system, const GicpConfig& config, std::size_t
 
 }  // namespace
 
+DepthInformation constrained(const NormalEquations& system, const GicpConfig& config) {
+  const Spectrum spectrum = analyse(system, config, 0.0);
+  const int kept = 6 - spectrum.open;
+  const Vector6d to_units = spectrum.units().cwiseInverse();
+  const Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6> basis =
+      to_units.asDiagonal() * spectrum.directions.rightCols(kept);
+  const Vector6d b = spectrum.units().asDiagonal() * system.b;
+  DepthInformation result;
+  result.H = basis * spectrum.eigenvalues.tail(kept).asDiagonal() * basis.transpose() /
+             config.covariance_inflation;
+  result.b =
+      basis * (spectrum.directions.rightCols(kept).transpose() * b) / config.covariance_inflation;
+  return result;
+}
+
 RegistrationResult register_clouds(const DepthCloud& source, const DepthCloud& target,
                                    const SE3& T_target_source_guess, const GicpConfig& config) {
   RegistrationResult result;

@@ -63,7 +63,7 @@ struct GicpConfig {
   std::size_t min_inliers = 100;  ///< fewer pairs: not converged
   /// Information is divided by this for what the residuals share (sensor's fixed pattern,
   /// correlated noise).
-  double covariance_inflation = 64.0;
+  double covariance_inflation = 18.0;
   /// A direction is open when its information is less than this many times what noise in the
   /// normals feigns.
   double min_information_ratio = 4.0;
@@ -87,6 +87,17 @@ struct NormalEquations {
 
   NormalEquations& operator+=(const NormalEquations& other);
 };
+
+/// What a system tells of the pose, to be added to other residuals' systems.
+struct DepthInformation {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+};
+
+/// A system's honest part: in directions that the surfaces constrain, without what the normals'
+/// noise feigns and divided by covariance_inflation; nothing in open ones, where the rest of b is
+/// noise that would pull the pose along a corridor.
+[[nodiscard]] DepthInformation constrained(const NormalEquations& system, const GicpConfig& config);
 
 /// Some of a cloud's surfels, each standing for `weight` of them.
 struct SurfelSample {

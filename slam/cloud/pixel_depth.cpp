@@ -6,12 +6,18 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "geoflow/hal/geometry.hpp"
+#include <Eigen/Core>
+
 #include "geoflow/hal/image.hpp"
 
-namespace geoflow::slam {
+#include "cloud/cell_grid.hpp"
+#include "cloud/depth_cloud.hpp"
 
-double depth_at(const FrameRef& depth, const Vector2d& raw, double depth_unit_m) {
+namespace geoflow::slam {
+namespace {
+
+/// The median [counts] of the 3 x 3 neighbourhood of a raw pixel; 0: none.
+double median_depth(const FrameRef& depth, const Eigen::Vector2d& raw) {
   constexpr std::size_t kEnough = 5;
   constexpr double kDiscontinuity = 0.05;
   if (!depth) {
@@ -36,7 +42,33 @@ double depth_at(const FrameRef& depth, const Vector2d& raw, double depth_unit_m)
   std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count));
   const double median = values.at(count / 2);
   const double spread = values.at(count - 1) - values.front();
-  return spread > kDiscontinuity * median ? 0 : median * depth_unit_m;
+  return spread > kDiscontinuity * median ? 0 : median;
+}
+
+}  // namespace
+
+double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vector2d& raw) {
+  const CellGrid& grid = cloud.grid();
+  const double measured = median_depth(depth, raw) * cloud.pixels().unit_m;
+  const Eigen::Vector2i cell = (raw.array() / grid.cell_px()).floor().cast<int>();
+  if (measured == 0 || cell.x() >= grid.columns() || cell.y() >= grid.rows()) {
+    return measured;
+  }
+  const auto index = static_cast<std::size_t>(cell.y() * grid.columns() + cell.x());
+  const Surfel& surfel = cloud.surfels()[index];
+  if (!surfel.valid()) {
+    return 0;
+  }
+  const CellGrid::Ray& ray = grid.ray(index);
+  const Eigen::Vector2d middle = (cell.cast<double>().array() + 0.5) * grid.cell_px() - 0.5;
+  const Eigen::Vector2d at =
+      ray.centre.cast<double>() + ray.per_pixel.cast<double>() * (raw - middle);
+  const Eigen::Vector3d normal = surfel.normal.cast<double>();
+  const double inverse_depth =
+      normal.dot(at.homogeneous()) / normal.dot(surfel.point.cast<double>());
+  constexpr double kOnSurfaceSigmas = 3.0;
+  const double off = std::abs(inverse_depth - 1.0 / measured);
+  return off < kOnSurfaceSigmas * static_cast<double>(cloud.sigma()) ? 1.0 / inverse_depth : 0;
 }
 
 }  // namespace geoflow::slam

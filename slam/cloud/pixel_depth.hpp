@@ -1,13 +1,17 @@
 #pragma once
 
-#include "geoflow/hal/geometry.hpp"
+#include <Eigen/Core>
+
 #include "geoflow/hal/image.hpp"
+
+#include "cloud/depth_cloud.hpp"
 
 namespace geoflow::slam {
 
-/// Depth [m] at a raw pixel: the median of its 3 x 3 neighbourhood; 0 where fewer than five pixels
-/// have a measurement or they spread over a depth discontinuity (more than 5 %), where one pixel's
-/// depth belongs to either side; 0 of an empty frame.
-[[nodiscard]] double depth_at(const FrameRef& depth, const Vector2d& raw, double depth_unit_m);
+/// Depth [m] at a raw pixel of the image that a cloud was built of: that of the surfel it lies on.
+/// 0 where it lies on none, has itself no depth or another one: at the edge of a thing a pixel's
+/// depth may be of what is before or behind it.
+[[nodiscard]] double depth_at(const DepthCloud& cloud, const FrameRef& depth,
+                              const Eigen::Vector2d& raw);
 
 }  // namespace geoflow::slam

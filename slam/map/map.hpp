@@ -37,7 +37,8 @@ struct MapPoint {
   std::uint32_t found = 0;                ///< of those, frames in which it agreed with the pose
 };
 
-/// The relative pose of two keyframes from their depth: a GICP factor (paper, equation (5)).
+/// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); or
+/// from IMU and legs in between.
 struct DepthEdge {
   KeyframeId from;
   KeyframeId to;

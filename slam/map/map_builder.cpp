@@ -22,7 +22,6 @@
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/gicp.hpp"
-#include "cloud/pixel_depth.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
 #include "map/overlap.hpp"
@@ -63,7 +62,6 @@ MapBuilder::MapBuilder(const Config& config, const GicpConfig& gicp, const Calib
     : config_{config},
       gicp_{gicp},
       camera_{calibration.camera},
-      depth_unit_m_{calibration.depth_unit_m},
       orb_{config.features},
       observer_{observer} {}
 
@@ -71,7 +69,8 @@ KeyframeId MapBuilder::insert(Map& map, Frame& frame, const Matrix6d& covariance
   cull(map, frame);
   if (!frame.place) {
     const StageScope scope{observer_, Stage::kFeatures};
-    frame.place = describe_place(frame.pyramid->image(), frame.depth, depth_unit_m_, camera_, orb_);
+    frame.place =
+        describe_place(frame.pyramid->image(), frame.depth, frame.cloud.get(), camera_, orb_);
   }
   const KeyframeId id = map.add_keyframe({.t = frame.t,
                                           .T_odom_cam = frame.T_odom_cam,
@@ -158,7 +157,7 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
        choose_new(frame.place->features, taken, image, config_.features)) {
     added.push_back({.raw = feature.pixel,
                      .ideal = camera_.undistort(feature.pixel),
-                     .depth_m = depth_at(frame.depth, feature.pixel, depth_unit_m_),
+                     .depth_m = frame.depth_at(feature.pixel),
                      .descriptor = feature.descriptor});
   }
   const auto points = find_points(map, frame, added, kSearchRadiusPx, camera_);

@@ -57,7 +57,6 @@ class MapBuilder {
   Config config_;
   GicpConfig gicp_;
   CameraModel camera_;
-  double depth_unit_m_;
   OrbExtractor orb_;
   StageObserver* observer_;
 };

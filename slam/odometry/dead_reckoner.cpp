@@ -38,6 +38,15 @@ double squared(double x) {
 
 }  // namespace
 
+ReckonedMotion operator*(const ReckonedMotion& first, const ReckonedMotion& second) {
+  const SE3& T_cam1_cam2 = second.T_cam0_cam1;  // frames: the second's first camera is cam1
+  const SE3 T_cam0_cam2 = first.T_cam0_cam1 * T_cam1_cam2;
+  const Matrix6d A = T_cam1_cam2.inverse().adjoint();
+  return {.T_cam0_cam1 = T_cam0_cam2,  // frames: of both together, cam2 is the later one
+          .covariance = A * first.covariance * A.transpose() + second.covariance,
+          .legs = first.legs && second.legs};
+}
+
 DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibration)
     : switches_{switches},
       T_base_cam_{calibration.T_base_cam.value_or(SE3{})},

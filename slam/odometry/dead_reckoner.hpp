@@ -20,6 +20,9 @@ struct ReckonedMotion {
   bool legs = false;  ///< feet or the robot's odometry had part in it
 };
 
+/// One motion after the other.
+[[nodiscard]] ReckonedMotion operator*(const ReckonedMotion& first, const ReckonedMotion& second);
+
 /// Predicts motion without the camera (paper, section IV-B: legged odometry first, then the IMU).
 /// It needs the imu's place on the camera; legs and body velocities besides need the camera's on
 /// the robot. Thread-compatible.

@@ -9,6 +9,7 @@
 #include "geoflow/hal/time.hpp"
 
 #include "cloud/depth_cloud.hpp"
+#include "cloud/pixel_depth.hpp"
 #include "map/map.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/place_view.hpp"
@@ -36,12 +37,17 @@ struct Frame {
   HostTime t;
   std::shared_ptr<const ImagePyramid> pyramid;  ///< null in a frame that was never read
   FrameRef depth;                               ///< empty: none
-  std::shared_ptr<const DepthCloud> cloud;      ///< null: none
+  std::shared_ptr<const DepthCloud> cloud;      ///< of `depth`; null: none
   std::vector<Feature> features;
   std::shared_ptr<const PlaceView> place;  ///< null until it is asked for
   SE3 T_odom_cam;
   /// Whether the pose hangs together with the map; otherwise it only follows from earlier frames.
   bool anchored = true;
+
+  /// Measured depth [m] at a raw pixel; 0: none.
+  [[nodiscard]] double depth_at(const Vector2d& raw) const {
+    return cloud ? slam::depth_at(*cloud, depth, raw) : 0;
+  }
 };
 
 }  // namespace geoflow::slam

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "geoflow/hal/geometry.hpp"
 
@@ -32,22 +31,35 @@ Eigen::Matrix<double, 3, 6> camera_point_jacobian(const Vector3d& q) {
   return J;
 }
 
-/// H - N as far as it is positive semidefinite.
-Matrix6d without_noise(const Matrix6d& H, const Matrix6d& N) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver{H - N};
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() *
-         solver.eigenvectors().transpose();
-}
-
 }  // namespace
 
 struct PoseOptimiser::System {
-  Matrix6d visual = Matrix6d::Zero();
-  Matrix6d depth = Matrix6d::Zero();
-  Matrix6d depth_noise = Matrix6d::Zero();  ///< the part of `depth` that is feigned
+  Matrix6d H = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   std::uint32_t depth_inliers = 0;
 };
+
+std::vector<VisualMatch> PoseOptimiser::expected(const PoseProblem& problem) const {
+  constexpr double kChi2Of2At999Permille = 13.8;
+  const SE3 T_cam_odom = problem.prior.T_odom_cam.inverse();
+  const Matrix6d P = problem.prior.information.inverse();
+  std::vector<VisualMatch> found;
+  for (const VisualMatch& match : problem.matches) {
+    const Vector3d p_cam = T_cam_odom * match.p_odom;
+    if (p_cam.z() < kMinimumDepthM) {
+      continue;
+    }
+    const Eigen::Matrix<double, 2, 6> J =
+        camera_.project_jacobian(p_cam) * camera_point_jacobian(p_cam);
+    const Eigen::Matrix2d S = J * P * J.transpose() + config_.pixel_sigma * config_.pixel_sigma *
+                                                          Eigen::Matrix2d::Identity();
+    const Vector2d r = camera_.project(p_cam) - match.pixel;
+    if (r.dot(S.ldlt().solve(r)) < kChi2Of2At999Permille) {
+      found.push_back(match);
+    }
+  }
+  return found;
+}
 
 double PoseOptimiser::pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const {
   constexpr double kMedianOfRayleigh = 1.17741;  // median of |r| of a 2-D Gaussian with sigma 1
@@ -79,14 +91,14 @@ void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam
     const Vector2d r = (camera_.project(p_cam) - match.pixel) / sigma_px;
     const Eigen::Matrix<double, 2, 6> J = camera_.project_jacobian(p_cam) * J_point / sigma_px;
     const double weight = cauchy_weight(r.squaredNorm());
-    system.visual += weight * J.transpose() * J;
+    system.H += weight * J.transpose() * J;
     system.gradient += weight * J.transpose() * r;
     if (match.depth_m > 0) {
       const double sigma_m = mapping_.depth_sigma_at_1m * match.depth_m * match.depth_m;
       const double rz = (p_cam.z() - match.depth_m) / sigma_m;
       const Eigen::Matrix<double, 1, 6> J_z = J_point.row(2) / sigma_m;
       const double weight_z = weight * cauchy_weight(rz * rz);
-      system.visual += weight_z * J_z.transpose() * J_z;
+      system.H += weight_z * J_z.transpose() * J_z;
       system.gradient += weight_z * J_z.transpose() * rz;
     }
   }
@@ -94,17 +106,22 @@ void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam
 
 void PoseOptimiser::add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
                               const SE3& T_odom_cam, System& system) const {
+  NormalEquations sum;
   for (const DepthTarget& target : problem.targets) {
     // A right perturbation of T_target_cam is one of T_odom_cam, so the systems simply add.
     const SE3 T_target_cam = target.T_odom_target.inverse() * T_odom_cam;
     const NormalEquations equations =
         linearise(*problem.cloud, sample, *target.cloud, T_target_cam, gicp_);
-    const double share = 1.0 / static_cast<double>(problem.targets.size());
-    system.depth += share * equations.H;
-    system.depth_noise += share * equations.H_noise;
-    system.gradient += share * equations.b;
     system.depth_inliers =
         std::max(system.depth_inliers, static_cast<std::uint32_t>(equations.inliers));
+    sum += equations;
+  }
+  if (sum.inliers > 0) {
+    // The targets see the same surfaces, with the same errors: together they count as one.
+    const double share = 1.0 / static_cast<double>(problem.targets.size());
+    const DepthInformation depth = constrained(sum, gicp_);
+    system.H += share * depth.H;
+    system.gradient += share * depth.b;
   }
 }
 
@@ -127,17 +144,15 @@ void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
   }
 }
 
-Matrix6d PoseOptimiser::covariance(const System& system, const Matrix6d& prior) const {
-  const Matrix6d depth = without_noise(system.depth, system.depth_noise);
-  const Matrix6d H = system.visual + depth + prior;
-  const Matrix6d B = system.visual + gicp_.covariance_inflation * depth + prior;
-  const Eigen::LDLT<Matrix6d> solver{H};
-  return solver.solve(solver.solve(B).transpose());
-}
-
-PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) const {
+PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) const {
   constexpr double kConverged = 1e-5;  // [rad], [m]
   PoseSolution solution;
+  const std::vector<VisualMatch> gated =
+      whole.gate_by_prior ? expected(whole) : std::vector<VisualMatch>{};
+  PoseProblem problem = whole;
+  if (whole.gate_by_prior) {
+    problem.matches = gated;
+  }
   solution.T_odom_cam = start;
   std::vector<SurfelSample> sample;
   if (problem.cloud != nullptr && !problem.targets.empty()) {
@@ -151,10 +166,10 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) 
     add_depth(problem, sample, solution.T_odom_cam, system);
     const Vector6d from_prior = (problem.prior.T_odom_cam.inverse() * solution.T_odom_cam).log();
     system.gradient += problem.prior.information * from_prior;
-    const Matrix6d H = system.visual + system.depth + problem.prior.information;
-    solution.covariance = covariance(system, problem.prior.information);
+    const Eigen::LDLT<Matrix6d> H{system.H + problem.prior.information};
+    solution.covariance = H.solve(Matrix6d::Identity());
     solution.depth_inliers = system.depth_inliers;
-    const Vector6d step = -H.ldlt().solve(system.gradient);
+    const Vector6d step = -H.solve(system.gradient);
     if (!step.allFinite()) {
       break;
     }
@@ -163,7 +178,7 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& problem, const SE3& start) 
       break;
     }
   }
-  classify(problem, solution.pixel_sigma, solution);
+  classify(whole, solution.pixel_sigma, solution);
   return solution;
 }
 

@@ -39,6 +39,9 @@ struct PoseProblem {
   const DepthCloud* cloud = nullptr;  ///< the frame's own depth; null: none
   std::span<const DepthTarget> targets;
   PosePrior prior;  ///< the motion model's prediction: decides only what nothing else sees
+  /// Leaves out matches that contradict the prior, for one that legs and IMU make: things that move
+  /// by themselves, and mirror images.
+  bool gate_by_prior = false;
 };
 
 struct PoseSolution {
@@ -61,10 +64,8 @@ struct PoseSolution {
 /// never below PoseConfig::pixel_sigma: a camera whose colour does not fit its depth thereby yields
 /// to the depth, without a switch.
 ///
-/// The covariance is H^-1 B H^-1 (White, "Maximum likelihood estimation of misspecified models",
-/// 1982): H as the terms are weighted, B the covariance of the gradient as it is known to be.
-/// Errors that residuals share make B larger than H: GicpConfig::covariance_inflation for depth.
-/// What the normals' noise feigns is in neither.
+/// The covariance is the inverse of the sum of what each says; of the depth that is only what
+/// constrained() leaves.
 class PoseOptimiser {
  public:
   PoseOptimiser(const PoseConfig& config, const MappingConfig& mapping, const GicpConfig& gicp,
@@ -75,7 +76,8 @@ class PoseOptimiser {
 
  private:
   struct System;
-  [[nodiscard]] Matrix6d covariance(const System& system, const Matrix6d& prior) const;
+  /// The matches that the prior allows, by chi-squared at 99.9 %.
+  [[nodiscard]] std::vector<VisualMatch> expected(const PoseProblem& problem) const;
   [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
   void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
                   System& system) const;

@@ -22,7 +22,6 @@
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
 #include "cloud/gicp_search.hpp"
-#include "cloud/pixel_depth.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"
@@ -67,7 +66,9 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
   }
   const StageScope scope{observer_, Stage::kCloud};
   if (packet.depth) {
-    auto cloud = std::make_shared<DepthCloud>(grid_, calibration_.depth_unit_m, DepthCloudConfig{});
+    auto cloud = std::make_shared<DepthCloud>(
+        grid_, DepthCloud::Pixels{calibration_.depth_unit_m, calibration_.depth_alignment},
+        DepthCloudConfig{});
     if (cloud->build(packet.depth)) {
       current_.cloud = std::move(cloud);
       current_.depth = packet.depth;
@@ -76,9 +77,7 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
 }
 
 Feature Tracker::feature_at(const Vector2d& raw) const {
-  return {.raw = raw,
-          .ideal = camera_.undistort(raw),
-          .depth_m = depth_at(current_.depth, raw, calibration_.depth_unit_m)};
+  return {.raw = raw, .ideal = camera_.undistort(raw), .depth_m = current_.depth_at(raw)};
 }
 
 void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
@@ -137,8 +136,8 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
 
 void Tracker::describe() {
   if (!current_.place) {
-    current_.place = describe_place(current_.pyramid->image(), current_.depth,
-                                    calibration_.depth_unit_m, camera_, orb_);
+    current_.place = describe_place(current_.pyramid->image(), current_.depth, current_.cloud.get(),
+                                    camera_, orb_);
   }
 }
 
@@ -231,6 +230,9 @@ void Tracker::follow(const Map& map, const SE3& T_odom_cam_predicted) {
 Tracker::InitialPose Tracker::first_guess(const Map& map, const InitialPose& predicted,
                                           bool blind) {
   follow(map, predicted.T_odom_cam);
+  if (predicted.sure && previous_.anchored && !blind) {
+    return predicted;
+  }
   InitialPose initial = initial_pose(predicted, matches(map));
   const bool held = previous_.anchored && !blind;
   current_.anchored = held;
@@ -279,8 +281,10 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
 TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predicted_by) {
   TrackingResult result;
   const bool blind = is_blind(prior);
+  // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image.
+  const bool reckoned = predicted_by == PoseSource::kLegs;
   const InitialPose initial = first_guess(
-      map, {.T_odom_cam = prior.T_odom_cam, .source = predicted_by, .sure = false}, blind);
+      map, {.T_odom_cam = prior.T_odom_cam, .source = predicted_by, .sure = reckoned}, blind);
   result.source = initial.source;
   result.sure = initial.sure;
   result.anchored = current_.anchored;
@@ -290,9 +294,12 @@ TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predi
   const std::vector<VisualMatch> visual = matches(map, &feature_of_match);
   const std::vector<DepthTarget> targets =
       depth_targets(map, initial.T_odom_cam, blind, result.overlap);
-  result.solution = optimiser_.solve(
-      {.matches = visual, .cloud = current_.cloud.get(), .targets = targets, .prior = prior},
-      initial.T_odom_cam);
+  result.solution = optimiser_.solve({.matches = visual,
+                                      .cloud = current_.cloud.get(),
+                                      .targets = targets,
+                                      .prior = prior,
+                                      .gate_by_prior = initial.source == PoseSource::kLegs},
+                                     initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
   result.covariance =
       initial.sure ? result.solution.covariance : Matrix6d{prior.information.inverse()};

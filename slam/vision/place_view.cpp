@@ -10,6 +10,7 @@
 
 #include "geoflow/hal/image.hpp"
 
+#include "cloud/depth_cloud.hpp"
 #include "cloud/pixel_depth.hpp"
 #include "vision/camera_model.hpp"
 #include "vision/orb_features.hpp"
@@ -30,13 +31,13 @@ cv::Mat1b descriptor_rows(const PlaceView& view) {
 }  // namespace
 
 std::shared_ptr<const PlaceView> describe_place(const cv::Mat& gray, const FrameRef& depth,
-                                                double depth_unit_m, const CameraModel& camera,
+                                                const DepthCloud* cloud, const CameraModel& camera,
                                                 OrbExtractor& orb) {
   auto view = std::make_shared<PlaceView>();
   view->features = orb.extract(gray);
   view->p_cam.reserve(view->features.size());
   for (const OrbFeature& feature : view->features) {
-    const double z = depth_at(depth, feature.pixel, depth_unit_m);
+    const double z = cloud == nullptr ? 0 : depth_at(*cloud, depth, feature.pixel);
     view->p_cam.push_back(camera.unproject(camera.undistort(feature.pixel), z));
   }
   return view;

@@ -9,6 +9,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 
+#include "cloud/depth_cloud.hpp"
 #include "vision/camera_model.hpp"
 #include "vision/orb_features.hpp"
 
@@ -23,10 +24,10 @@ struct PlaceView {
   std::vector<Vector3d> p_cam;
 };
 
-/// Describes an image (CV_8UC1) and its registered depth (empty: none).
+/// Describes an image (CV_8UC1) and its registered depth with the cloud made of it (null: none).
 [[nodiscard]] std::shared_ptr<const PlaceView> describe_place(const cv::Mat& gray,
                                                               const FrameRef& depth,
-                                                              double depth_unit_m,
+                                                              const DepthCloud* cloud,
                                                               const CameraModel& camera,
                                                               OrbExtractor& orb);
 

@@ -74,8 +74,9 @@ class Engine {
 
 class OwnEngine : public Engine {
  public:
-  OwnEngine(const std::shared_ptr<const slam::CellGrid>& grid, double depth_unit_m)
-      : source_{grid, depth_unit_m, {}}, target_{grid, depth_unit_m, {}} {}
+  OwnEngine(const std::shared_ptr<const slam::CellGrid>& grid,
+            const slam::DepthCloud::Pixels& pixels)
+      : source_{grid, pixels, {}}, target_{grid, pixels, {}} {}
   [[nodiscard]] const char* name() const override { return "geoflow"; }
   [[nodiscard]] Answer align(const FrameRef& source, const FrameRef& target) override {
     Answer answer;
@@ -222,7 +223,7 @@ Result<std::vector<GicpBenchmarkRow>> run_gicp_benchmark(const GicpBenchmarkOpti
     return tl::unexpected{grid.error()};
   }
   const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
-  OwnEngine own{*grid, sequence->calibration.depth_unit_m};
+  OwnEngine own{*grid, {sequence->calibration.depth_unit_m, sequence->calibration.depth_alignment}};
   PclEngine pcl{sequence->calibration, options};
   std::vector<GicpBenchmarkRow> rows;
   for (const int step : options.steps) {

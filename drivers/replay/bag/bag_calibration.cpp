@@ -23,6 +23,13 @@ namespace {
 constexpr const char* kStaticTransforms = "/tf_static";
 constexpr double kRosDepthUnitM = 1e-3;
 
+/// realsense-ros has depth that librealsense aligned under this name.
+DepthAlignment alignment_of(std::string_view depth_topic) {
+  return depth_topic.find("aligned_depth_to_color") == std::string_view::npos
+             ? DepthAlignment::kExact
+             : DepthAlignment::kNearestTouching;
+}
+
 /// Collects what messages say until nothing more is wanted.
 class Collector {
  public:
@@ -98,13 +105,15 @@ FoundCalibration find_bag_calibration(Bag& bag, const TopicChoice& choice, const
   bag.scan([&](std::string_view topic) { return collector.wants(topic); },
            [&](const BagMessage& message) { collector.add(message); },
            [&] { return collector.has_camera(); });
-  FoundCalibration found{.camera = collector.camera(),
-                         .depth_unit_m = extras.depth_unit_m.value_or(kRosDepthUnitM),
-                         .T_cam_imu = std::nullopt,
-                         .timeshift_cam_imu = extras.timeshift_cam_imu,
-                         .imu_noise = extras.imu_noise,
-                         .T_base_cam = std::nullopt,
-                         .source = choice.camera_info};
+  FoundCalibration found{
+      .camera = collector.camera(),
+      .depth_unit_m = extras.depth_unit_m.value_or(kRosDepthUnitM),
+      .depth_alignment = extras.depth_alignment.value_or(alignment_of(choice.depth)),
+      .T_cam_imu = std::nullopt,
+      .timeshift_cam_imu = extras.timeshift_cam_imu,
+      .imu_noise = extras.imu_noise,
+      .T_base_cam = std::nullopt,
+      .source = choice.camera_info};
   const StaticTransforms& transforms = collector.transforms();
   for (const std::string& base : {names.base_frame, std::string{"base"}}) {
     if (!found.T_base_cam) {

@@ -21,6 +21,7 @@ namespace geoflow::drivers::bag {
 namespace {
 
 constexpr const char* kDepthUnit = "geoflow.depth_unit_m";
+constexpr const char* kDepthAlignment = "geoflow.depth_alignment";
 constexpr const char* kTimeshift = "geoflow.timeshift_cam_imu_ns";
 
 constexpr std::array<std::pair<const char*, double ImuNoise::*>, 5> kNoise{{
@@ -65,6 +66,9 @@ Extras parse_extras(const CustomData& custom_data) {
   constexpr std::int64_t kLargestShiftNs = 10'000'000'000;
   Extras extras;
   extras.depth_unit_m = positive(custom_data, kDepthUnit);
+  if (const auto name = custom_data.find(kDepthAlignment); name != custom_data.end()) {
+    extras.depth_alignment = depth_alignment(name->second);
+  }
   const auto shift = number<std::int64_t>(custom_data, kTimeshift);
   if (shift && *shift >= -kLargestShiftNs && *shift <= kLargestShiftNs) {
     extras.timeshift_cam_imu = Duration{*shift};
@@ -92,6 +96,9 @@ CustomData to_custom_data(const Extras& extras) {
   CustomData data;
   if (extras.depth_unit_m) {
     data[kDepthUnit] = fmt::format("{}", *extras.depth_unit_m);
+  }
+  if (extras.depth_alignment) {
+    data[kDepthAlignment] = name_of(*extras.depth_alignment);
   }
   if (extras.timeshift_cam_imu) {
     data[kTimeshift] = fmt::format("{}", extras.timeshift_cam_imu->count());

@@ -12,10 +12,11 @@
 namespace geoflow::drivers::bag {
 
 /// What a bag of this project says in metadata.yaml's custom_data, because no standard message can:
-/// keys `geoflow.depth_unit_m`, `geoflow.timeshift_cam_imu_ns`, `geoflow.imu_noise.*`,
-/// `geoflow.stamps.*` (docs/recordings.md).
+/// keys `geoflow.depth_unit_m`, `geoflow.depth_alignment`, `geoflow.timeshift_cam_imu_ns`,
+/// `geoflow.imu_noise.*`, `geoflow.stamps.*` (docs/recordings.md).
 struct Extras {
   std::optional<double> depth_unit_m{};
+  std::optional<DepthAlignment> depth_alignment{};
   std::optional<Duration> timeshift_cam_imu{};
   std::optional<ImuNoise> imu_noise{};
   RecordingStamps stamps{};

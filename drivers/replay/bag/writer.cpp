@@ -30,6 +30,7 @@ using bag::to_message;
 Extras extras_of(const BagWriterOptions& options, const Calibration& calibration) {
   return {
       .depth_unit_m = calibration.depth_unit_m,
+      .depth_alignment = calibration.depth_alignment,
       .timeshift_cam_imu = calibration.timeshift_cam_imu,
       .imu_noise = calibration.imu_noise,
       .stamps = {

@@ -80,6 +80,7 @@ Calibration from_recording(const FoundCalibration& found) {
   Calibration calibration;
   calibration.camera = *found.camera;
   calibration.depth_unit_m = found.depth_unit_m.value_or(calibration.depth_unit_m);
+  calibration.depth_alignment = found.depth_alignment.value_or(calibration.depth_alignment);
   calibration.imu_noise = found.imu_noise.value_or(calibration.imu_noise);
   calibration.source = found.source;
   return calibration;

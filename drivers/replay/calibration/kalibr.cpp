@@ -191,6 +191,19 @@ bool is_further_camera(std::string_view key) {
          key.find_first_not_of("0123456789", kPrefix.size()) == std::string_view::npos;
 }
 
+Result<void> read_depth_alignment(const Entry& entry, DepthAlignment& alignment) {
+  const auto name = yaml::text(entry);
+  if (!name) {
+    return tl::unexpected{name.error()};
+  }
+  const auto known = depth_alignment(*name);
+  if (!known) {
+    return tl::unexpected{entry.error("expected exact or nearest_touching, found " + *name)};
+  }
+  alignment = *known;
+  return {};
+}
+
 Result<void> read_top_key(const Entry& entry, std::string_view key, Calibration& calibration) {
   if (key == "cam0") {
     return read_camera(entry, calibration);
@@ -201,6 +214,9 @@ Result<void> read_top_key(const Entry& entry, std::string_view key, Calibration&
   if (key == "depth_factor") {
     return store(yaml::positive(entry).map([](double counts_per_m) { return 1 / counts_per_m; }),
                  calibration.depth_unit_m);
+  }
+  if (key == "depth_alignment") {
+    return read_depth_alignment(entry, calibration.depth_alignment);
   }
   if (key == "serial") {
     return store(yaml::text(entry), calibration.serial);

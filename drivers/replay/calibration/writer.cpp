@@ -77,6 +77,7 @@ std::string write_camchain(const Calibration& calibration) {
     text += "T_base_cam:\n" + rows(*calibration.T_base_cam, "");
   }
   text += fmt::format("depth_factor: {}\n", 1 / calibration.depth_unit_m);
+  text += fmt::format("depth_alignment: {}\n", name_of(calibration.depth_alignment));
   if (!calibration.serial.empty()) {
     std::string quoted = calibration.serial;
     std::erase_if(quoted, [](char c) { return c == '\'' || c < ' '; });

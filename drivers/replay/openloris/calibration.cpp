@@ -190,6 +190,7 @@ Result<FoundCalibration> parse_sensors(std::string_view file, std::string conten
   FoundCalibration found;
   found.camera = camera;
   found.depth_unit_m = kDepthUnit_m;
+  found.depth_alignment = DepthAlignment::kNearestTouching;  // a D435i's, aligned by realsense-ros
   found.source = file;
   return found;
 }

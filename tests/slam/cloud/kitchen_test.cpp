@@ -22,7 +22,7 @@ class DepthClouds : public CameraSink {
         unit_m_{calibration.depth_unit_m} {}
   void on_color(const Arrival<CameraClock, ColorFrame>& /*frame*/) override {}
   void on_depth(const Arrival<CameraClock, DepthFrame>& frame) override {
-    clouds.emplace_back(grid_, unit_m_, DepthCloudConfig{});
+    clouds.emplace_back(grid_, DepthCloud::Pixels{unit_m_}, DepthCloudConfig{});
     ASSERT_TRUE(clouds.back().build(frame.sample.image));
   }
   std::vector<DepthCloud> clouds;

@@ -19,8 +19,8 @@ inline slam::DepthCloud view(const Scene& scene, const SE3& T_world_cam, std::ui
                              DepthNoise noise = kKinectNoise) {
   const slam::DepthCloudConfig config;
   noise.seed = seed;
-  slam::DepthCloud cloud{slam::CellGrid::create(vga_camera(), config.cell_px).value(), kUnitM,
-                         config};
+  slam::DepthCloud cloud{
+      slam::CellGrid::create(vga_camera(), config.cell_px).value(), {.unit_m = kUnitM}, config};
   EXPECT_TRUE(cloud.build(render(scene, T_world_cam, vga_camera(), kUnitM, noise)));
   return cloud;
 }

@@ -81,8 +81,8 @@ Frame RecordedPlaces::look(const FrameRef& color, const FrameRef& depth) {
   packet.depth = depth;
   tracker_->begin_frame(packet);
   Frame frame = tracker_->current();
-  frame.place = describe_place(frame.pyramid->image(), frame.depth, calibration_.depth_unit_m,
-                               camera(), orb_);
+  frame.place =
+      describe_place(frame.pyramid->image(), frame.depth, frame.cloud.get(), camera(), orb_);
   return frame;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
@@ -48,11 +49,38 @@ struct ImuNoise {
   // NOLINTEND(readability-magic-numbers)
 };
 
+/// How depth came to lie on the colour image's pixels.
+enum class DepthAlignment : std::uint8_t {
+  /// Each pixel has the depth of what it shows.
+  kExact,
+  /// librealsense's (`align.cpp`; realsense-ros' `aligned_depth_to_color`): each pixel has the
+  /// nearest depth of all depth pixels whose outline touches it. That is too near, on a slanted
+  /// surface by what depth changes over half a pixel (20 mm on the floor 3 m in front of a camera
+  /// 0.3 m high), and by part of the noise.
+  kNearestTouching,
+};
+
+/// As it stands in files: "exact" or "nearest_touching".
+[[nodiscard]] constexpr const char* name_of(DepthAlignment alignment) noexcept {
+  return alignment == DepthAlignment::kExact ? "exact" : "nearest_touching";
+}
+/// The inverse; none of any other name.
+[[nodiscard]] constexpr std::optional<DepthAlignment> depth_alignment(
+    std::string_view name) noexcept {
+  for (const auto alignment : {DepthAlignment::kExact, DepthAlignment::kNearestTouching}) {
+    if (name == name_of(alignment)) {
+      return alignment;
+    }
+  }
+  return std::nullopt;
+}
+
 /// One robot's sensors. Depth is registered to the colour camera and shares its intrinsics.
 struct Calibration {
   CameraIntrinsics camera;
   // NOLINTNEXTLINE(readability-magic-numbers): a millimetre
   double depth_unit_m = 1e-3;  ///< metres per count of a kDepth16 pixel
+  DepthAlignment depth_alignment = DepthAlignment::kExact;
   std::optional<SE3> T_cam_imu{};
   /// t_imu = t_cam + this (Kalibr's timeshift_cam_imu).
   Duration timeshift_cam_imu{};

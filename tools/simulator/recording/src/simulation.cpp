@@ -70,6 +70,7 @@ std::vector<HostTime> sample_times(double rate_hz, double duration_s, double mea
 Calibration make_calibration(const SimulationOptions& options, const CameraIntrinsics& camera) {
   Calibration calibration;
   calibration.camera = camera;
+  calibration.depth_alignment = DepthAlignment::kNearestTouching;  // as align_to_color() does it
   calibration.T_cam_imu = d435i_T_cam_imu();
   calibration.T_base_cam = go2_T_base_cam();
   calibration.imu_noise = options.imu.noise;
