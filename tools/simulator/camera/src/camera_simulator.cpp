@@ -15,6 +15,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/mount.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
@@ -113,16 +114,11 @@ std::span<const Knob<CameraOptions>> camera_knobs() {
   return kKnobs;
 }
 
-// NOLINTBEGIN(readability-magic-numbers): calibrations of real devices
 SE3 d435i_T_cam_ir() {
-  // Published of a D435i (firmware 5.12.14.50): colour in the depth camera's frame.
-  Matrix3d rotation;
-  rotation << 0.999956, -0.009402, -0.000683, 0.009402, 0.999955, -0.000868, 0.000691, 0.000861,
-      0.999999;
-  const SE3 T_ir_cam{rotation, Vector3d{-0.01501, 0.00136, -0.00025}};
-  return T_ir_cam.inverse();
+  return d435i_T_depth_cam().inverse();
 }
 
+// NOLINTBEGIN(readability-magic-numbers): calibrations of real devices
 CameraIntrinsics d435i_color_intrinsics(int width, int height) {
   // The published calibration of the D435i on a Go2.
   return scaled({.width = 640,

@@ -56,6 +56,7 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
   for_each_tile_row(intrinsics.width, intrinsics.height, [&](int top) {
     return [&, legs = sender.legs(top)](const Tile& tile) {
       const int seen = steady ? steady->at(tile) : SteadyTiles::kMixed;
+      const Sender::PixelBits pixels = sender.pixel_bits(tile);
       LaneColours sum{};
       for (int part = 0; part < sampling.rays_a_pixel; ++part) {
         RayPacket packet;
@@ -66,7 +67,8 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
                           .key = subkey(sampling.key + static_cast<std::uint64_t>(part),
                                         static_cast<std::uint64_t>(tile.top) * width +
                                             static_cast<std::uint64_t>(tile.left))};
-        sender.aim_tile(tile, part, legs[static_cast<std::size_t>(part)], packet, look.order);
+        sender.aim_tile(tile, pixels, part, legs[static_cast<std::size_t>(part)], packet,
+                        look.order);
         end_rays(subject, tile, seen, packet);
         LaneColours light{};
         subject.shader.shade(tile.valid, packet, look, light);

@@ -69,13 +69,25 @@ std::vector<Sender::Leg> Sender::legs(int top) const {
   return legs;
 }
 
-void Sender::aim_tile(const Tile& tile, int part, const Leg& leg, RayPacket& packet,
-                      std::array<int, kPacket>& order) const {
+Sender::PixelBits Sender::pixel_bits(const Tile& tile) const {
   constexpr unsigned kRowBits = 16;
+  PixelBits pixels{};
+  const auto key = static_cast<std::uint32_t>(sampling_.key);
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const auto column = static_cast<std::uint32_t>(tile.left + static_cast<int>(i % kTile));
+      const auto row = static_cast<std::uint32_t>(tile.top + static_cast<int>(i / kTile));
+      pixels[i] = scramble32(scramble32(((row << kRowBits) | column) ^ key) + key);
+    }
+  });
+  return pixels;
+}
+
+void Sender::aim_tile(const Tile& tile, const PixelBits& pixels, int part, const Leg& leg,
+                      RayPacket& packet, std::array<int, kPacket>& order) const {
   constexpr std::uint32_t kPartStep = 0x9e3779b9U;  // 2^32 over the golden ratio
   constexpr unsigned kByteBits = 8;
   with_wide_vectors([&]() __attribute__((always_inline)) {
-    const auto key = static_cast<std::uint32_t>(sampling_.key);
     const int parts = sampling_.rays_a_pixel;
     const float inverse_parts = 1.0F / static_cast<float>(parts);
     const auto exposure_s = static_cast<float>(shutter_.exposure_s);
@@ -88,9 +100,7 @@ void Sender::aim_tile(const Tile& tile, int part, const Leg& leg, RayPacket& pac
     for (std::size_t i = 0; i < kPacket; ++i) {
       const int column = tile.left + static_cast<int>(i % kTile);
       const int row = std::min(tile.top + static_cast<int>(i / kTile), shutter_.rows - 1);
-      const std::uint32_t number =
-          (static_cast<std::uint32_t>(row) << kRowBits) | static_cast<std::uint32_t>(column);
-      const std::uint32_t pixel = scramble32(scramble32(number ^ key) + key);
+      const std::uint32_t pixel = pixels[i];
       const std::uint32_t bits = scramble32(pixel + static_cast<std::uint32_t>(part) * kPartStep);
       const auto stratum_x = static_cast<float>(turned(part, parts, pixel, 0));
       const auto stratum_y = static_cast<float>(turned(part, parts, pixel, kByteBits));

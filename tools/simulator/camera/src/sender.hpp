@@ -35,10 +35,14 @@ class Sender {
   /// The legs of the row of tiles that begins at pixel row `top`, part by part.
   [[nodiscard]] std::vector<Leg> legs(int top) const;
 
+  /// Random bits of each of a tile's pixels, for all parts of its exposure.
+  using PixelBits = std::array<std::uint32_t, kPacket>;
+  [[nodiscard]] PixelBits pixel_bits(const Tile& tile) const;
+
   /// Aims a packet's rays of part `part`, and says which number each has in an order of its pixel's
   /// rays.
-  void aim_tile(const Tile& tile, int part, const Leg& leg, RayPacket& packet,
-                std::array<int, kPacket>& order) const;
+  void aim_tile(const Tile& tile, const PixelBits& pixels, int part, const Leg& leg,
+                RayPacket& packet, std::array<int, kPacket>& order) const;
 
  private:
   Pinhole pinhole_;

@@ -206,12 +206,16 @@ void Shader::look_at_patch(std::size_t index, const Valid& lanes, const RayPacke
   const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
   const auto first = static_cast<std::size_t>(std::ranges::find(lanes, -1) - lanes.begin());
   const Hits hits = meet(patch, packet, look, first);
-  LaneColours irradiance;
+  // Most packets see one patch.
+  const bool whole = std::ranges::count(lanes, -1) == static_cast<std::ptrdiff_t>(kPacket);
+  LaneColours other_irradiance;
+  LaneColours other_albedo;
+  LaneColours& irradiance = whole ? seen.irradiance : other_irradiance;
+  LaneColours& albedo = whole ? seen.albedo : other_albedo;
   lighting_->on_patch(index, hits.u, hits.v, irradiance);
   if (!people_.empty()) {
     dim_by_people(hits, irradiance);
   }
-  LaneColours albedo;
   Lanes contrast{};
   if (material.texture >= 0) {
     paint(patch, hits, look, albedo, contrast);
@@ -220,16 +224,17 @@ void Shader::look_at_patch(std::size_t index, const Valid& lanes, const RayPacke
   }
   const Vector3f normal = hits.facing * patch.normal();
   for (std::size_t i = 0; i < kPacket; ++i) {
-    if (lanes[i] != 0) {
-      seen.material[i] = &material;
-      seen.albedo[i] = albedo[i];
-      seen.irradiance[i] = irradiance[i];
-      seen.normal_x[i] = normal.x();
-      seen.normal_y[i] = normal.y();
-      seen.normal_z[i] = normal.z();
-      seen.cosine[i] = hits.cosine[i];
-      seen.contrast[i] = contrast[i];
+    if (lanes[i] == 0) {
+      continue;
     }
+    seen.material[i] = &material;
+    seen.albedo[i] = albedo[i];
+    seen.irradiance[i] = irradiance[i];
+    seen.normal_x[i] = normal.x();
+    seen.normal_y[i] = normal.y();
+    seen.normal_z[i] = normal.z();
+    seen.cosine[i] = hits.cosine[i];
+    seen.contrast[i] = contrast[i];
   }
 }
 

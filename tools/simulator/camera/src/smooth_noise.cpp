@@ -20,9 +20,11 @@ SmoothNoise::Weights SmoothNoise::weights(float position) noexcept {
   const auto inner = [](float u) { return kSixth * (kFour - 6.0F * u * u + 3.0F * u * u * u); };
   Weights result{.first = static_cast<std::size_t>(cell),
                  .weight = {kSixth * s * s * s, inner(t), inner(s), kSixth * t * t * t}};
+  float squares = 0;
   for (const float weight : result.weight) {
-    result.squares += weight * weight;
+    squares += weight * weight;
   }
+  result.scale = 1.0F / std::sqrt(squares);
   return result;
 }
 
@@ -50,7 +52,7 @@ void SmoothNoise::row(int y, std::vector<float>& out) const {
     for (std::size_t k = 0; k < across.weight.size(); ++k) {
       sum += across.weight[k] * nodes[across.first + k];
     }
-    out[x] = sum / std::sqrt(across.squares * down.squares);
+    out[x] = sum * across.scale * down.scale;
   }
 }
 

@@ -22,12 +22,12 @@ class SmoothNoise {
   std::uint64_t key_;
   float pitch_y_;
   std::size_t columns_;
-  /// For each pixel of a row: the first of four columns, their weights, and the sum of the weights'
-  /// squares.
+  /// For each pixel of a row: the first of four columns, their weights, and one over the
+  /// root of the sum of the weights' squares.
   struct Weights {
     std::size_t first = 0;
     std::array<float, 4> weight{};
-    float squares = 0;
+    float scale = 0;
   };
   [[nodiscard]] static Weights weights(float position) noexcept;
   std::vector<Weights> pixels_;

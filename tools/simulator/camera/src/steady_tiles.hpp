@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "src/ray_scene.hpp"
@@ -28,10 +29,11 @@ struct Shutter {
 /// no tracing: they end where they meet the patch's plane.
 ///
 /// One ray a pixel is traced at the middle of its row's exposure. Whatever is seen there stays
-/// within its reach during the exposure: how far the camera's turn and shift, at that depth, and a
-/// walker's own motion move it over the image. A tile is steady if all reaches that touch it are of
-/// the same patch, and its own does not leave the image. What is thinner than a pixel may be
-/// missed, as it may be by any pixel's rays.
+/// within its reach during the exposure: where the camera's motion, at the tile's nearest and
+/// farthest depth, and a walker's own take it in the image. A tile is steady if all reaches that
+/// touch it are of the same patch. Beyond the image anything may be, but nothing nearer than the
+/// nearest that the image shows. What is
+/// thinner than a pixel may be missed, as it may be by any pixel's rays.
 class SteadyTiles {
  public:
   static constexpr int kMixed = -1;
@@ -50,14 +52,36 @@ class SteadyTiles {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);
   }
-  void look(const RayScene& rays, const Pinhole& pinhole, const Shutter& shutter, int width,
-            const ViewTrack& track);
-  void spread();
+  /// From one tile, in tiles.
+  struct Reach {
+    int left = 0;
+    int right = 0;
+    int up = 0;
+    int down = 0;
+  };
+  /// What a tile sees lies between the two, and moves by itself by `walk_m`.
+  struct Depths {
+    float nearest_m = std::numeric_limits<float>::infinity();
+    float farthest_m = 0;
+    float walk_m = 0;
+  };
+  /// Where a row of tiles looks during its exposure.
+  struct Glance {
+    double mid_s = 0;
+    View middle;
+    std::vector<View> others;
+  };
+  void look(const RayScene& rays, const Shutter& shutter, int width);
+  [[nodiscard]] Reach reach(int column, int row, const Depths& depths) const;
+  void mark(int column, int row, const Reach& reach, int seen);
 
   int columns_;
   int rows_;
-  std::vector<int> centre_;  ///< what each tile sees in the middle of its exposure
-  std::vector<int> reach_;   ///< in tiles each way
+  Pinhole pinhole_;
+  float walk_m_;                 ///< how far people move during half the exposure
+  std::vector<Glance> glances_;  ///< of each row of tiles
+  std::vector<Depths> depths_;   ///< of each tile
+  std::vector<int> centre_;      ///< what each tile sees in the middle of its exposure
   std::vector<int> seen_;
 };
 

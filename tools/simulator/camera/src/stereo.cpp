@@ -12,6 +12,7 @@
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 
 #include "src/infrared_view.hpp"
@@ -116,7 +117,8 @@ class Matcher {
     disparity += scale * static_cast<float>(options_->depth_subpixel_px) *
                  disparity_spread(seen_->signal[i]) * (correlated + white);
     if (scale > 0) {
-      disparity = std::round(kSubpixelSteps * disparity) / kSubpixelSteps;
+      disparity =
+          static_cast<float>(whole_below(kSubpixelSteps * disparity + 0.5F)) / kSubpixelSteps;
     }
     const float depth = disparity > 0 ? focal_baseline_ / disparity : 0.0F;
     const bool in_range = depth >= static_cast<float>(options_->depth_min_m) &&
@@ -125,6 +127,12 @@ class Matcher {
   }
 
   [[nodiscard]] static bool lost(float signal, float field) {
+    // Most pixels are far from it: a field of 6 deviations holes nothing above e^3 times the least.
+    constexpr float kWide = 6.0F;
+    constexpr float kClear = 20.1F;
+    if (signal > kClear * kLeastSignal && field < kWide) {
+      return false;
+    }
     return std::log(std::max(signal, std::numeric_limits<float>::min()) / kLeastSignal) <
            kHoleSpread * field;
   }
@@ -136,8 +144,8 @@ class Matcher {
     constexpr float kNothing = 0.35F;
     constexpr float kBetween = 0.5F;
     const auto column = static_cast<std::size_t>(x);
-    const int seen_x = x + static_cast<int>(std::lround(kRagged_px * random.aside[column]));
-    const int seen_y = y + static_cast<int>(std::lround(kRagged_px * random.above[column]));
+    const int seen_x = x + whole_below(kRagged_px * random.aside[column] + 0.5F);
+    const int seen_y = y + whole_below(kRagged_px * random.above[column] + 0.5F);
     const float disparity = disparity_at(seen_x, seen_y);
     float nearest = disparity;
     float farthest = disparity;

@@ -40,22 +40,15 @@ struct Pinhole {
   }
 };
 
-/// A camera's way over some time: views at even steps of half a millisecond or less, linear
+/// A camera's way over some time: views at even steps of a millisecond or less, linear
 /// between them. Of a turn that speeds up by 200 rad/s^2, as when a foot hits the ground, that is
-/// within 6e-6 rad.
+/// within 2.5e-5 rad.
 class ViewTrack {
  public:
   ViewTrack(double begin_s, double end_s, const PoseAt& T_world_cam);
 
   /// The view at a time, or at the nearer end.
   [[nodiscard]] View at(double t_s) const;
-
-  /// The largest motion between two views that are at most `duration_s` apart.
-  struct Motion {
-    float turn_rad = 0;
-    float shift_m = 0;
-  };
-  [[nodiscard]] Motion largest_motion(double duration_s) const;
 
  private:
   double begin_s_;

@@ -118,6 +118,52 @@ void furnish_hall(Builder builder, const Vector2f& size, const FurnitureMaterial
   }
 }
 
+/// Sizes [m]: two rooms side by side below, and the hall over both.
+struct Plan {
+  float living_x;
+  float kitchen_x;
+  float rooms_y;
+  float hall_y;
+};
+
+/// Where the doors' middles are [m]: x of those to the hall, y of that between the rooms.
+struct Doors {
+  float living;
+  float kitchen;
+  float between;
+};
+
+void light_rooms(Builder builder, const Plan& plan) {
+  const auto& [living_x, kitchen_x, rooms_y, hall_y] = plan;
+  for (const auto& [corner, size] :
+       {std::pair{Vector3f{0, 0, 0}, Vector3f{living_x, rooms_y, kHeight_m}},
+        {Vector3f{living_x, 0, 0}, Vector3f{kitchen_x, rooms_y, kHeight_m}},
+        {Vector3f{0, rooms_y, 0}, Vector3f{living_x + kitchen_x, hall_y, kHeight_m}}}) {
+    add_ceiling_lamps(builder.at(corner), size,
+                      {.lux = 180,
+                       .spacing_m = {5, 5},
+                       .size_m = {0.5F, 0.5F},
+                       .colour = Rgb{1.0F, 0.88F, 0.72F, 0}});
+  }
+}
+
+void walk_round(Builder builder, const Plan& plan, const Doors& doors) {
+  // Round: hall, living room, kitchen, hall.
+  const auto point = [](float x, float y) {
+    return Vector2d{static_cast<double>(x), static_cast<double>(y)};
+  };
+  const float hall = plan.rooms_y + 0.5F * plan.hall_y - 0.12F;
+  const float above = plan.rooms_y - 0.78F;
+  const float before_door = plan.living_x - 0.75F;
+  const float behind_door = plan.living_x + 0.65F;
+  builder.scene().waypoints = {point(doors.living, hall),         point(doors.living, above),
+                               point(before_door, above),         point(before_door, doors.between),
+                               point(behind_door, doors.between), point(behind_door, above),
+                               point(doors.kitchen, above),       point(doors.kitchen, hall),
+                               point(doors.living, hall)};
+  builder.scene().closed = true;
+}
+
 }  // namespace
 
 void lay_out_home(Builder builder, Random random) {
@@ -127,6 +173,8 @@ void lay_out_home(Builder builder, Random random) {
   const float rooms_y = random.uniform(4.3F, 4.9F);
   const float hall_y = random.uniform(1.7F, 2.0F);
   const float total_x = living_x + kitchen_x;
+  const Plan plan{
+      .living_x = living_x, .kitchen_x = kitchen_x, .rooms_y = rooms_y, .hall_y = hall_y};
   const Rgb oak{0.42F, 0.27F, 0.15F, 0};
   const TileStyle tiles{.colour = Rgb{0.5F, 0.48F, 0.45F, 0},
                         .joint = grey(0.25F),
@@ -167,30 +215,9 @@ void lay_out_home(Builder builder, Random random) {
   furnish_living_room(builder, {living_x, rooms_y}, m, random.fork("living room"));
   furnish_kitchen(builder.at({living_x, 0, 0}), {kitchen_x, rooms_y}, m, random.fork("kitchen"));
   furnish_hall(builder.at({0, rooms_y, 0}), {total_x, hall_y}, m, random.fork("hall"));
-  for (const auto& [corner, size] :
-       {std::pair{Vector3f{0, 0, 0}, Vector3f{living_x, rooms_y, kHeight_m}},
-        {Vector3f{living_x, 0, 0}, Vector3f{kitchen_x, rooms_y, kHeight_m}},
-        {Vector3f{0, rooms_y, 0}, Vector3f{total_x, hall_y, kHeight_m}}}) {
-    add_ceiling_lamps(builder.at(corner), size,
-                      {.lux = 180,
-                       .spacing_m = {5, 5},
-                       .size_m = {0.5F, 0.5F},
-                       .colour = Rgb{1.0F, 0.88F, 0.72F, 0}});
-  }
-
-  // Round: hall, living room, kitchen, hall.
-  const auto point = [](float x, float y) {
-    return Vector2d{static_cast<double>(x), static_cast<double>(y)};
-  };
+  light_rooms(builder, plan);
   const float hall = rooms_y + 0.5F * hall_y - 0.12F;
-  const float above = rooms_y - 0.78F;
-  const float before_door = living_x - 0.75F;
-  const float behind_door = living_x + 0.65F;
-  builder.scene().waypoints = {
-      point(living_door, hall),    point(living_door, above),   point(before_door, above),
-      point(before_door, between), point(behind_door, between), point(behind_door, above),
-      point(kitchen_door, above),  point(kitchen_door, hall),   point(living_door, hall)};
-  builder.scene().closed = true;
+  walk_round(builder, plan, {.living = living_door, .kitchen = kitchen_door, .between = between});
   add_pedestrians(builder, {{{1.0F, hall}, {total_x - 1.0F, hall}}}, 0, random.fork("people"));
 }
 

@@ -107,6 +107,22 @@ Materials make_materials(Builder& builder, Random random) {
   return m;
 }
 
+/// Tubes along both lanes, of which some are out, and one in the middle.
+void hang_lamps(Builder builder, const Vector3f& hall_m, float lane_y, Random& random) {
+  const auto hang = [&](float x, float y) {
+    builder.lamp({x, y - 0.06F, hall_m.z() - 0.37F}, {0, 0.12F, 0}, {1.2F, 0, 0}, kLamp_nit,
+                 Rgb{0.95F, 1.0F, 0.88F, 0});
+  };
+  for (const float y : {lane_y, hall_m.y() - lane_y}) {
+    for (float x = 3.0F; x < hall_m.x(); x += 6.0F) {
+      if (random.chance(0.75F)) {
+        hang(x, y);
+      }
+    }
+  }
+  hang(0.5F * hall_m.x(), 0.5F * hall_m.y());
+}
+
 }  // namespace
 
 void lay_out_parking(Builder builder, Random random) {
@@ -135,18 +151,8 @@ void lay_out_parking(Builder builder, Random random) {
   for (float y = 0.5F * kSlotDepth_m + 3.2F; y < depth; y += 7.0F) {
     builder.rod({0.5F, y, height - 0.12F}, {length - 0.5F, y, height - 0.12F}, 0.06F, m.rim);
   }
-  // Some lamps are out.
   const float lane_y = kSlotDepth_m + 0.5F * kLane_m;
-  for (const float y : {lane_y, depth - lane_y}) {
-    for (float x = 3.0F; x < length; x += 6.0F) {
-      if (random.chance(0.75F)) {
-        builder.lamp({x, y - 0.06F, height - 0.37F}, {0, 0.12F, 0}, {1.2F, 0, 0}, kLamp_nit,
-                     Rgb{0.95F, 1.0F, 0.88F, 0});
-      }
-    }
-  }
-  builder.lamp({0.5F * length, 0.5F * depth - 0.06F, height - 0.37F}, {0, 0.12F, 0}, {1.2F, 0, 0},
-               kLamp_nit, Rgb{0.95F, 1.0F, 0.88F, 0});
+  hang_lamps(builder, hall.size_m, lane_y, random);
 
   constexpr float kHalfTurn = std::numbers::pi_v<float>;
   const float row_m = kSlot_m * static_cast<float>(slots);

@@ -73,20 +73,23 @@ Vector3f place_aside(Random& random, const Vector2f& half_walk) {
   }
 }
 
+/// A clear day, some hours from noon.
+Daylight daylight(float light, Random& random) {
+  const float azimuth = random.uniform(0.0F, 2.0F * std::numbers::pi_v<float>);
+  const float elevation = random.uniform(0.6F, 0.95F);
+  return {.to_sun = {std::cos(elevation) * std::cos(azimuth),
+                     std::cos(elevation) * std::sin(azimuth), std::sin(elevation)},
+          .sun_lux = 55'000.0F * light,
+          .sun_colour = Rgb{1.0F, 0.96F, 0.88F, 0},
+          .sky_nit = 4'000.0F * light,
+          .sky_colour = Rgb{0.45F, 0.65F, 1.0F, 0}};
+}
+
 }  // namespace
 
 void lay_out_plaza(Builder builder, Random random) {
   Scene& scene = builder.scene();
-  const float light = static_cast<float>(builder.options().light_level);
-  const float azimuth = random.uniform(0.0F, 2.0F * std::numbers::pi_v<float>);
-  const float elevation = random.uniform(0.6F, 0.95F);
-  scene.daylight =
-      Daylight{.to_sun = {std::cos(elevation) * std::cos(azimuth),
-                          std::cos(elevation) * std::sin(azimuth), std::sin(elevation)},
-               .sun_lux = 55'000.0F * light,
-               .sun_colour = Rgb{1.0F, 0.96F, 0.88F, 0},
-               .sky_nit = 4'000.0F * light,
-               .sky_colour = Rgb{0.45F, 0.65F, 1.0F, 0}};
+  scene.daylight = daylight(static_cast<float>(builder.options().light_level), random);
   const float warm = random.uniform(0.85F, 1.0F);
   const TileStyle slabs{.colour = Rgb{0.36F, 0.35F * warm, 0.33F * warm, 0},
                         .joint = grey(0.12F),

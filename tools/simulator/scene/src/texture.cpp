@@ -115,29 +115,42 @@ Texture::Texture(const std::vector<Rgb>& pixels, int side, float length_m, Repea
   }
 }
 
-void Texture::turn(Lanes& u, Lanes& v) const noexcept {
-  // Neighbouring rays mostly see the same copy.
-  int known_column = 0;
-  int known_row = 0;
-  std::uint64_t turns = subkey(0, 0) & 3U;
+[[gnu::always_inline]] inline void Texture::turn(Lanes& u, Lanes& v) const noexcept {
+  std::array<int, kLanes> columns{};
+  std::array<int, kLanes> rows{};
+  int others = 0;  // lanes that see another copy than the first
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const int column = whole_below(u[i]);
-    const int row = whole_below(v[i]);
-    if (column != known_column || row != known_row) {
-      known_column = column;
-      known_row = row;
-      turns = subkey(static_cast<std::uint64_t>(static_cast<std::uint32_t>(column)),
-                     static_cast<std::uint32_t>(row)) &
-              3U;
-    }
-    const float across = u[i] - static_cast<float>(column);
-    const float down = v[i] - static_cast<float>(row);
-    const bool quarter = (turns & 1U) != 0;
-    const float turned_u = quarter ? down : across;
-    const float turned_v = quarter ? 1.0F - across : down;
-    const bool half = (turns & 2U) != 0;
+    columns[i] = whole_below(u[i]);
+    rows[i] = whole_below(v[i]);
+    u[i] -= static_cast<float>(columns[i]);
+    v[i] -= static_cast<float>(rows[i]);
+  }
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    others |= (columns[i] ^ columns[0]) | (rows[i] ^ rows[0]);
+  }
+  const auto turns = [&](std::size_t i) {
+    constexpr std::uint64_t kQuarters = 3;
+    return subkey(static_cast<std::uint64_t>(static_cast<std::uint32_t>(columns[i])),
+                  static_cast<std::uint32_t>(rows[i])) &
+           kQuarters;
+  };
+  const std::uint64_t common = turns(0);
+  const auto turn_lane = [&](std::size_t i, std::uint64_t by) __attribute__((always_inline)) {
+    const bool quarter = (by & 1U) != 0;
+    const float turned_u = quarter ? v[i] : u[i];
+    const float turned_v = quarter ? 1.0F - u[i] : v[i];
+    const bool half = (by & 2U) != 0;
     u[i] = half ? 1.0F - turned_u : turned_u;
     v[i] = half ? 1.0F - turned_v : turned_v;
+  };
+  if (others == 0) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      turn_lane(i, common);
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    turn_lane(i, turns(i));
   }
 }
 
