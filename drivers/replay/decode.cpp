@@ -10,8 +10,10 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"

@@ -16,6 +16,7 @@ struct DecodeOptions {
   int width = 0;               ///< [px]; 0: whatever the image says, up to 8192
   int height = 0;              ///< [px]
   bool color_as_gray = false;  ///< colour becomes kGray8 instead of kBgr8
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double depth_unit_m = 1e-3;  ///< of the kDepth16 that depth in floating metres becomes
 };
 

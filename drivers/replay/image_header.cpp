@@ -39,10 +39,10 @@ std::uint32_t big_endian(Bytes bytes, std::size_t index, std::size_t size) {
   return value;
 }
 
-template <std::size_t kSize>
-bool matches(Bytes bytes, std::size_t index, const std::array<std::uint8_t, kSize>& expected) {
-  return bytes.size() >= index + kSize &&
-         std::ranges::equal(bytes.subspan(index, kSize), expected, {},
+template <std::size_t KSize>
+bool matches(Bytes bytes, std::size_t index, const std::array<std::uint8_t, KSize>& expected) {
+  return bytes.size() >= index + KSize &&
+         std::ranges::equal(bytes.subspan(index, KSize), expected, {},
                             [](std::byte byte) { return std::to_integer<std::uint8_t>(byte); });
 }
 

@@ -12,7 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"

@@ -4,14 +4,14 @@
 #include <filesystem>
 #include <fstream>
 #include <ios>
-#include <istream>
 #include <limits>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 

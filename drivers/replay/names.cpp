@@ -2,7 +2,6 @@
 #include <array>
 #include <cstddef>
 #include <string_view>
-#include <type_traits>
 #include <variant>
 
 #include "geoflow/drivers/faults.hpp"
@@ -43,7 +42,7 @@ StreamId stream_of(const Event& event) noexcept {
   return kStreams[event.index()];
 }
 
-HostTime arrival_of(const Event& event) noexcept {
+HostTime arrival_of(const Event& event) {
   return std::visit([](const auto& sample) { return sample.t_arrival; }, event);
 }
 

@@ -11,6 +11,9 @@
 #include <variant>
 #include <vector>
 
+#include <tl/expected.hpp>
+
+#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
@@ -95,8 +98,8 @@ Prefetched Prefetcher::read_one() {
     auto event = reader_->next();
     if (!event) {
       item.event = tl::unexpected{std::move(event.error())};
-    } else if (*event) {
-      item.event = std::visit([this](const auto& sample) { return decode_event(sample); }, **event);
+    } else if (const std::optional<Event>& found = *event) {
+      item.event = std::visit([this](const auto& sample) { return decode_event(sample); }, *found);
     } else {
       item.event = std::nullopt;
     }
@@ -116,9 +119,11 @@ Result<DecodedEvent> Prefetcher::decode_event(const Arrival<CameraClock, Encoded
     return tl::unexpected{std::move(frame.error())};
   }
   if (image.sample.stream == ImageStream::kDepth) {
-    return Arrival<CameraClock, DepthFrame>{image.t_device, image.t_arrival, {*std::move(frame)}};
+    return Arrival<CameraClock, DepthFrame>{
+        .t_device = image.t_device, .t_arrival = image.t_arrival, .sample = {*std::move(frame)}};
   }
-  return Arrival<CameraClock, ColorFrame>{image.t_device, image.t_arrival, {*std::move(frame)}};
+  return Arrival<CameraClock, ColorFrame>{
+      .t_device = image.t_device, .t_arrival = image.t_arrival, .sample = {*std::move(frame)}};
 }
 
 Result<FrameRef> Prefetcher::decode_timed(const EncodedImage& image) {

@@ -101,6 +101,6 @@ class RecordingReader {
 [[nodiscard]] StreamId stream_of(const Event& event) noexcept;
 
 /// The arrival time of an event. Pure.
-[[nodiscard]] HostTime arrival_of(const Event& event) noexcept;
+[[nodiscard]] HostTime arrival_of(const Event& event);
 
 }  // namespace geoflow::drivers

@@ -13,6 +13,8 @@
 #include <variant>
 #include <vector>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
@@ -35,7 +37,7 @@ namespace geoflow::drivers {
 namespace {
 
 constexpr std::size_t kRecentErrors = 32;
-constexpr double kLongestWait_s = 1e8;
+constexpr double kLongestWaitS = 1e8;
 
 DecodeOptions decode_options(const Calibration& calibration, const RecordingOptions& options) {
   return {.width = calibration.camera.width,
@@ -82,10 +84,11 @@ class RecordedStreams::Implementation {
       reject(item.event.error());
       return tl::unexpected{std::move(item.event.error())};
     }
-    if (!*item.event) {
+    const auto& found = *item.event;
+    if (!found) {
       return false;
     }
-    deliver(**item.event);
+    deliver(*found);
     return true;
   }
 
@@ -101,20 +104,21 @@ class RecordedStreams::Implementation {
         reject(item.event.error());
         continue;
       }
-      if (!*item.event) {
+      const auto& found = *item.event;
+      if (!found) {
         return {};
       }
-      const HostTime t = arrival(**item.event);
+      const HostTime t = arrival(*found);
       if (!first) {
         first = t;
         shift_ = begin - t;
       }
-      const double ahead_s = std::clamp(to_seconds(t - *first) / speed, 0.0, kLongestWait_s);
+      const double ahead_s = std::clamp(to_seconds(t - *first) / speed, 0.0, kLongestWaitS);
       if (!wait_until(begin + from_seconds(ahead_s), stop)) {
         pending_ = std::move(item);
         return {};
       }
-      deliver(**item.event);
+      deliver(*found);
     }
     return {};
   }
@@ -139,7 +143,8 @@ class RecordedStreams::Implementation {
 
  private:
   Prefetched take() {
-    Prefetched item = pending_ ? *std::exchange(pending_, std::nullopt) : prefetcher_.take();
+    Prefetched item = pending_ ? *std::move(pending_) : prefetcher_.take();
+    pending_.reset();
     if (item.faults) {
       faults_ = *item.faults;
     }

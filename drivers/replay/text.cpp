@@ -16,7 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -156,6 +157,7 @@ std::optional<Duration> parse_seconds(std::string_view text) noexcept {
   if (!seconds || *seconds >= kMostSeconds) {
     return std::nullopt;
   }
+  constexpr std::int64_t kDecimal = 10;
   std::int64_t nanoseconds = 0;
   for (std::size_t i = 0; i < std::max(fraction.size(), kNanosecondDigits); ++i) {
     const char digit = i < fraction.size() ? fraction[i] : '0';
@@ -163,7 +165,7 @@ std::optional<Duration> parse_seconds(std::string_view text) noexcept {
       return std::nullopt;
     }
     if (i < kNanosecondDigits) {
-      nanoseconds = nanoseconds * 10 + (digit - '0');
+      nanoseconds = nanoseconds * kDecimal + (digit - '0');
     }
   }
   return Duration{*seconds * kNanosecondsPerSecond + nanoseconds};

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <ios>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -18,7 +19,6 @@
 
 #include <tl/expected.hpp>
 
-#include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"
 
 #include "replay/bag/bag_file.hpp"
@@ -221,7 +221,11 @@ void Bag::scan(const std::function<bool(std::string_view)>& wanted,
     while (const auto row = (*file)->next().value_or(std::nullopt)) {
       const FileTopic& topic = (*file)->topics()[row->topic];
       if (const auto data = (*file)->data(*row)) {
-        visit({topic.name, topic.type, row->timestamp_ns, *data, (*file)->describe(*row)});
+        visit({.topic = topic.name,
+               .type = topic.type,
+               .timestamp_ns = row->timestamp_ns,
+               .data = *data,
+               .origin = (*file)->describe(*row)});
       }
     }
     if (enough()) {
@@ -241,7 +245,9 @@ void Bag::select(std::function<bool(std::string_view)> wanted) {
 Result<std::optional<BagMessage>> Bag::next() {
   Result<void> ready{};
   if (delivered_) {
-    ready = advance(*std::exchange(delivered_, std::nullopt));
+    const std::size_t last = *delivered_;
+    delivered_.reset();
+    ready = advance(last);
   }
   ready = ready.and_then([this] { return open_due_parts(); });
   if (!ready) {
@@ -267,8 +273,11 @@ Result<std::optional<BagMessage>> Bag::next() {
     return fail(ErrorCode::kUnsupported, "{}: serialization '{}' is not supported, only cdr",
                 first->file->describe(first->row), topic.serialization_format);
   }
-  return BagMessage{topic.name, topic.type, first->row.timestamp_ns, *data,
-                    first->file->describe(first->row)};
+  return BagMessage{.topic = topic.name,
+                    .type = topic.type,
+                    .timestamp_ns = first->row.timestamp_ns,
+                    .data = *data,
+                    .origin = first->file->describe(first->row)};
 }
 
 Result<void> Bag::open_due_parts() {
@@ -299,8 +308,8 @@ Result<void> Bag::open_due_parts() {
 
 Result<void> Bag::advance(std::size_t index) {
   auto row = open_[index].file->next();
-  if (row && *row) {
-    open_[index].row = **row;
+  if (const std::optional<MessageRow> found = row.value_or(std::nullopt)) {
+    open_[index].row = *found;
     return {};
   }
   open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(index));

@@ -28,14 +28,17 @@ constexpr std::size_t kFloatBytes = 4;
 
 // The first name of a format is the one that is written.
 constexpr std::array kColorEncodings{
-    EncodingName{"rgb8", PixelFormat::kRgb8},  EncodingName{"bgr8", PixelFormat::kBgr8},
-    EncodingName{"8UC3", PixelFormat::kBgr8},  EncodingName{"mono8", PixelFormat::kGray8},
-    EncodingName{"8UC1", PixelFormat::kGray8}, EncodingName{"yuv422_yuy2", PixelFormat::kYuyv},
+    EncodingName{.name = "rgb8", .format = PixelFormat::kRgb8},
+    EncodingName{.name = "bgr8", .format = PixelFormat::kBgr8},
+    EncodingName{.name = "8UC3", .format = PixelFormat::kBgr8},
+    EncodingName{.name = "mono8", .format = PixelFormat::kGray8},
+    EncodingName{.name = "8UC1", .format = PixelFormat::kGray8},
+    EncodingName{.name = "yuv422_yuy2", .format = PixelFormat::kYuyv},
 };
 constexpr std::array kDepthEncodings{
-    EncodingName{"16UC1", PixelFormat::kDepth16},
-    EncodingName{"mono16", PixelFormat::kDepth16},
-    EncodingName{"32FC1", PixelFormat::kDepth16, true},
+    EncodingName{.name = "16UC1", .format = PixelFormat::kDepth16},
+    EncodingName{.name = "mono16", .format = PixelFormat::kDepth16},
+    EncodingName{.name = "32FC1", .format = PixelFormat::kDepth16, .metres_f32 = true},
 };
 
 std::optional<EncodingName> find_encoding(std::string_view name, ImageStream stream) {

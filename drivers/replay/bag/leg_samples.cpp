@@ -1,13 +1,14 @@
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"

@@ -12,6 +12,7 @@
 
 #include <tl/expected.hpp>
 
+#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -101,12 +102,13 @@ class BagReader final : public RecordingReader {
     if (!message) {
       return tl::unexpected{message.error()};
     }
-    if (!*message) {
+    const std::optional<BagMessage>& found = *message;
+    if (!found) {
       return std::nullopt;
     }
-    auto event = to_event(**message);
+    auto event = to_event(*found);
     if (!event) {
-      return tl::unexpected{std::move(event).error().in((*message)->origin)};
+      return tl::unexpected{std::move(event).error().in(found->origin)};
     }
     return std::optional{std::move(*event)};
   }
@@ -120,7 +122,7 @@ class BagReader final : public RecordingReader {
         {choice_.legs, StreamId::kLegs},
         {choice_.odometry, StreamId::kBodyVelocity},
     }};
-    const auto found = std::ranges::find_if(
+    const auto* const found = std::ranges::find_if(
         streams, [topic](const auto& stream) { return !topic.empty() && stream.first == topic; });
     return found == streams.end() ? std::nullopt : std::optional{found->second};
   }

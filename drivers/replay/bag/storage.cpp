@@ -1,6 +1,7 @@
 #include "replay/bag/storage.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
@@ -16,10 +17,12 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/types.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/hal/unique_fd.hpp"
 
 #include "replay/bag/metadata.hpp"
@@ -34,14 +37,14 @@ namespace fs = std::filesystem;
 // In this order. WAL with NORMAL is rosbag2's own "resilient" profile: after a power cut the
 // database is whole up to a recent transaction. Large pages, because an image then lies on few of
 // them; the log is folded in every 64 MiB.
-constexpr const char* kPragmas[] = {
+constexpr std::array kPragmas{
     "PRAGMA page_size=32768",
     "PRAGMA journal_mode=WAL",
     "PRAGMA synchronous=NORMAL",
     "PRAGMA wal_autocheckpoint=2048",
 };
 
-constexpr const char* kSchema[] = {
+constexpr std::array kSchema{
     "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL)",
     "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata "
     "TEXT NOT NULL)",
@@ -176,6 +179,9 @@ Result<Storage::Topic> Storage::add_topic(const std::string& name, std::string_v
 Result<void> Storage::write(const std::string& topic, std::string_view type,
                             std::int64_t timestamp_ns, std::span<const std::byte> message,
                             bool latched) {
+  if (!insert_) {
+    return fail(ErrorCode::kInvalidArgument, "{}: is closed", database_path_.native());
+  }
   if (!in_transaction_) {
     if (auto begun = database_->execute("BEGIN"); !begun) {
       return named(std::move(begun));

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/core.h>
+#include <fmt/format.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/recording.hpp"

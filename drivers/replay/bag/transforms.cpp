@@ -44,7 +44,7 @@ std::optional<SE3> StaticTransforms::find(const std::string& a, const std::strin
     queue.pop_front();
     const SE3 T_start_frame = T_start_reached.at(frame);
     if (frame == goal) {
-      return T_start_frame;
+      return std::optional{T_start_frame};
     }
     const auto edges = frames_.find(frame);
     if (edges == frames_.end()) {

@@ -1,4 +1,3 @@
-#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -9,6 +8,8 @@
 
 #include "geoflow/drivers/bag_writer.hpp"
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -197,7 +198,8 @@ void BagWriter::on_body_velocity(const Arrival<LegClock, BodyVelocitySample>& sa
 
 void BagWriter::write_odometry(const std::string& topic, HostTime t, const OdometrySample& sample) {
   const BagWriterOptions& options = implementation_->options();
-  ros::Odometry message = to_message(BodyVelocitySample{sample.v_child_mps, sample.w_child_radps});
+  ros::Odometry message = to_message(
+      BodyVelocitySample{.v_base_mps = sample.v_child_mps, .w_base_radps = sample.w_child_radps});
   message.header.frame_id = options.odom_frame;
   message.child_frame_id = options.topics.base_frame;
   const ros::Transform transform = bag::to_transform(sample.T_parent_child);

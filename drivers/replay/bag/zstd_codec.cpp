@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <sys/types.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 #include <zstd.h>

@@ -11,9 +11,9 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/stat.h>
 #include <sys/types.h>
+#include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/drivers/calibration_file.hpp"

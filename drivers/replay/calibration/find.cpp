@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/drivers/calibration_file.hpp"
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
@@ -76,9 +78,9 @@ bool has_word(std::string_view text, std::string_view word) {
   return false;
 }
 
-Calibration from_recording(const FoundCalibration& found) {
+Calibration from_recording(const FoundCalibration& found, const CameraIntrinsics& camera) {
   Calibration calibration;
-  calibration.camera = *found.camera;
+  calibration.camera = camera;
   calibration.depth_unit_m = found.depth_unit_m.value_or(calibration.depth_unit_m);
   calibration.depth_alignment = found.depth_alignment.value_or(calibration.depth_alignment);
   calibration.imu_noise = found.imu_noise.value_or(calibration.imu_noise);
@@ -133,7 +135,7 @@ Result<Calibration> find_calibration(const RecordingOptions& options,
   if (options.calibration || has_calibration(folder)) {
     calibration = load_calibration(options.calibration.value_or(folder));
   } else if (found.camera) {
-    calibration = from_recording(found);
+    calibration = from_recording(found, *found.camera);
   } else if (auto published = published_calibration(folder.filename().string())) {
     calibration = *std::move(published);
   } else if (reader.info().has(StreamId::kColor) || reader.info().has(StreamId::kDepth)) {

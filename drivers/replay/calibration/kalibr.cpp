@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/result.hpp"
@@ -23,7 +24,7 @@ namespace {
 using yaml::Entry;
 
 constexpr double kLargestSide = 65535;
-constexpr double kLongestTimeshift_s = 3600;
+constexpr double kLongestTimeshiftS = 3600;
 constexpr std::size_t kIntrinsicCount = 4;
 
 /// Stores `value` in `target` or passes the error on.
@@ -107,7 +108,7 @@ Result<void> read_timeshift(const Entry& entry, Duration& timeshift) {
   if (!seconds) {
     return tl::unexpected{seconds.error()};
   }
-  if (std::abs(*seconds) > kLongestTimeshift_s) {
+  if (std::abs(*seconds) > kLongestTimeshiftS) {
     return tl::unexpected{entry.error(fmt::format("{} s is not a plausible time shift", *seconds))};
   }
   timeshift = from_seconds(*seconds);

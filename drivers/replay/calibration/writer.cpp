@@ -1,15 +1,15 @@
 #include "replay/calibration/writer.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
+#include <fmt/core.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -16,8 +17,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <fmt/core.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <tl/expected.hpp>
 #include <yaml-cpp/yaml.h>
 
 #include "geoflow/hal/geometry.hpp"
@@ -147,7 +149,8 @@ Result<SE3> transform(const Entry& entry) {
     return tl::unexpected{entry.error("four rows of four numbers are expected")};
   }
   std::vector<double> values;
-  for (const auto& row : entry.node) {
+  for (const auto& item : entry.node) {
+    const YAML::Node& row = item;
     const auto parsed = numbers(Entry{.file = entry.file, .key = entry.key, .node = row}, kSide);
     if (!parsed) {
       return tl::unexpected{parsed.error()};

@@ -1,6 +1,5 @@
 #include "replay/euroc/reader.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +9,8 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
@@ -36,15 +37,21 @@ constexpr std::size_t kAccelAt = 4;
 bool head_fits(const std::filesystem::path& path) {
   auto file = text::LineFile::open(path);
   for (int attempt = 0; file && attempt < 2; ++attempt) {
-    const auto line = file->next();
-    if (!line || !*line) {
+    const auto line = file->next().value_or(std::nullopt);
+    if (!line) {
       return false;
     }
-    if (parse_line((*line)->text)) {
+    if (parse_line(line->text)) {
       return true;
     }
   }
   return false;
+}
+
+/// Whether a first line names columns.
+bool is_head(const Result<std::optional<text::Line>>& first) {
+  const auto line = first.value_or(std::nullopt);
+  return line && !parse_line(line->text);
 }
 
 class Reader final : public RecordingReader {
@@ -56,18 +63,17 @@ class Reader final : public RecordingReader {
 
   [[nodiscard]] Result<std::optional<Event>> next() override {
     auto line = file_.next();
-    if (line && *line && !begun_ &&
-        !parse_line((*line)->text)) {  // the head line, where it is no comment
+    if (!std::exchange(begun_, true) && is_head(line)) {
       line = file_.next();
     }
-    begun_ = true;
     if (!line) {
       return tl::unexpected{std::move(line.error())};
     }
-    if (!*line) {
+    const std::optional<text::Line>& found = *line;
+    if (!found) {
       return std::nullopt;
     }
-    auto sample = parse_line((*line)->text);
+    auto sample = parse_line(found->text);
     if (!sample) {
       return tl::unexpected{std::move(sample.error()).in(file_.where())};
     }
@@ -89,9 +95,12 @@ Result<RecordingInfo> survey(const std::filesystem::path& path) {
   std::uint64_t count = 0;
   std::optional<HostTime> start;
   HostTime end;
-  for (auto line = file->next(); !line || *line; line = file->next()) {
-    const auto sample = line ? parse_line((*line)->text) : tl::unexpected{line.error()};
-    if (sample) {
+  for (auto line = file->next(); !line || line->has_value(); line = file->next()) {
+    const auto found = line.value_or(std::nullopt);
+    if (!found) {
+      continue;
+    }
+    if (const auto sample = parse_line(found->text)) {
       start = start.value_or(sample->t_arrival);
       end = sample->t_arrival;
       ++count;

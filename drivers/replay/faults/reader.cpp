@@ -62,9 +62,9 @@ class FaultReader final : public RecordingReader {
       if (!event) {
         return event;
       }
-      if (*event) {
-        horizon_ = std::max(horizon_, arrival_of(**event));
-        pass({**std::move(event)}, 0);
+      if (std::optional<Event>& found = *event) {
+        horizon_ = std::max(horizon_, arrival_of(*found));
+        pass({*std::move(found)}, 0);
       } else {
         ended_ = true;
         finish();
@@ -144,7 +144,7 @@ class FaultReader final : public RecordingReader {
 }  // namespace
 
 std::unique_ptr<RecordingReader> with_faults(std::unique_ptr<RecordingReader> inner,
-                                             std::vector<Fault> faults, std::uint64_t seed) {
+                                             const std::vector<Fault>& faults, std::uint64_t seed) {
   return std::make_unique<FaultReader>(std::move(inner), std::move(faults), seed);
 }
 

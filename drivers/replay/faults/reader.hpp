@@ -13,7 +13,7 @@ namespace geoflow::drivers::faults {
 /// and the events in order of their arrival again. A clock fault makes its clock's stamps
 /// StampDomain::kDevice. The same script, seed and recording give the same events.
 [[nodiscard]] std::unique_ptr<RecordingReader> with_faults(std::unique_ptr<RecordingReader> inner,
-                                                           std::vector<Fault> faults,
+                                                           const std::vector<Fault>& faults,
                                                            std::uint64_t seed);
 
 }  // namespace geoflow::drivers::faults

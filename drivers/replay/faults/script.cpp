@@ -13,7 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 #include <toml++/toml.h>
 
 #include "geoflow/drivers/faults.hpp"
@@ -28,10 +29,10 @@ namespace {
 
 constexpr std::size_t kMostFaults = 64;
 constexpr std::size_t kLargestScript = std::size_t{1} << 20U;
-constexpr double kLongestTime_s = 1e6;
-constexpr double kLongestDelay_s = 10;
-constexpr double kMostDrift_ppm = 1e5;
-constexpr double kWrapPeriod_s = 4294.967296;
+constexpr double kLongestTimeS = 1e6;
+constexpr double kLongestDelayS = 10;
+constexpr double kMostDriftPpm = 1e5;
+constexpr double kWrapPeriodS = 4294.967296;
 
 using Streams = std::bitset<kStreamCount>;
 using Kinds = std::uint32_t;
@@ -60,28 +61,66 @@ struct NumberKey {
 };
 
 constexpr std::array kNumberKeys = {
-    NumberKey{"probability", [](Fault& f, double v) { f.probability = v; }, kRandomKinds, 0, 0, 1},
-    NumberKey{"from_s", [](Fault& f, double v) { f.from = from_seconds(v); },
-              kEveryKind & ~bit(FaultKind::kClockWrap),
-              any_of(FaultKind::kGap, FaultKind::kClockJump), 0, kLongestTime_s},
-    NumberKey{"until_s", [](Fault& f, double v) { f.until = from_seconds(v); },
-              kEveryKind & ~any_of(FaultKind::kClockWrap, FaultKind::kClockJump),
-              bit(FaultKind::kGap), 0, kLongestTime_s},
-    NumberKey{"delay_s", [](Fault& f, double v) { f.delay = from_seconds(v); },
-              bit(FaultKind::kDelay), bit(FaultKind::kDelay), 0, kLongestDelay_s},
-    NumberKey{"jitter_s", [](Fault& f, double v) { f.jitter = from_seconds(v); },
-              bit(FaultKind::kDelay), 0, 0, kLongestDelay_s},
-    NumberKey{"keep", [](Fault& f, double v) { f.keep = v; }, bit(FaultKind::kTruncate), 0, 0, 1},
-    NumberKey{"offset_s", [](Fault& f, double v) { f.offset = from_seconds(v); },
-              bit(FaultKind::kClockOffset), bit(FaultKind::kClockOffset), -kLongestTime_s,
-              kLongestTime_s},
-    NumberKey{"jump_s", [](Fault& f, double v) { f.offset = from_seconds(v); },
-              bit(FaultKind::kClockJump), bit(FaultKind::kClockJump), -kLongestTime_s,
-              kLongestTime_s},
-    NumberKey{"drift_ppm", [](Fault& f, double v) { f.drift_ppm = v; }, bit(FaultKind::kClockDrift),
-              bit(FaultKind::kClockDrift), -kMostDrift_ppm, kMostDrift_ppm},
-    NumberKey{"first_wrap_s", [](Fault& f, double v) { f.first_wrap = from_seconds(v); },
-              bit(FaultKind::kClockWrap), bit(FaultKind::kClockWrap), 0, kWrapPeriod_s},
+    NumberKey{.name = "probability",
+              .store = [](Fault& f, double v) { f.probability = v; },
+              .used_by = kRandomKinds,
+              .needed_by = 0,
+              .least = 0,
+              .most = 1},
+    NumberKey{.name = "from_s",
+              .store = [](Fault& f, double v) { f.from = from_seconds(v); },
+              .used_by = kEveryKind & ~bit(FaultKind::kClockWrap),
+              .needed_by = any_of(FaultKind::kGap, FaultKind::kClockJump),
+              .least = 0,
+              .most = kLongestTimeS},
+    NumberKey{.name = "until_s",
+              .store = [](Fault& f, double v) { f.until = from_seconds(v); },
+              .used_by = kEveryKind & ~any_of(FaultKind::kClockWrap, FaultKind::kClockJump),
+              .needed_by = bit(FaultKind::kGap),
+              .least = 0,
+              .most = kLongestTimeS},
+    NumberKey{.name = "delay_s",
+              .store = [](Fault& f, double v) { f.delay = from_seconds(v); },
+              .used_by = bit(FaultKind::kDelay),
+              .needed_by = bit(FaultKind::kDelay),
+              .least = 0,
+              .most = kLongestDelayS},
+    NumberKey{.name = "jitter_s",
+              .store = [](Fault& f, double v) { f.jitter = from_seconds(v); },
+              .used_by = bit(FaultKind::kDelay),
+              .needed_by = 0,
+              .least = 0,
+              .most = kLongestDelayS},
+    NumberKey{.name = "keep",
+              .store = [](Fault& f, double v) { f.keep = v; },
+              .used_by = bit(FaultKind::kTruncate),
+              .needed_by = 0,
+              .least = 0,
+              .most = 1},
+    NumberKey{.name = "offset_s",
+              .store = [](Fault& f, double v) { f.offset = from_seconds(v); },
+              .used_by = bit(FaultKind::kClockOffset),
+              .needed_by = bit(FaultKind::kClockOffset),
+              .least = -kLongestTimeS,
+              .most = kLongestTimeS},
+    NumberKey{.name = "jump_s",
+              .store = [](Fault& f, double v) { f.offset = from_seconds(v); },
+              .used_by = bit(FaultKind::kClockJump),
+              .needed_by = bit(FaultKind::kClockJump),
+              .least = -kLongestTimeS,
+              .most = kLongestTimeS},
+    NumberKey{.name = "drift_ppm",
+              .store = [](Fault& f, double v) { f.drift_ppm = v; },
+              .used_by = bit(FaultKind::kClockDrift),
+              .needed_by = bit(FaultKind::kClockDrift),
+              .least = -kMostDriftPpm,
+              .most = kMostDriftPpm},
+    NumberKey{.name = "first_wrap_s",
+              .store = [](Fault& f, double v) { f.first_wrap = from_seconds(v); },
+              .used_by = bit(FaultKind::kClockWrap),
+              .needed_by = bit(FaultKind::kClockWrap),
+              .least = 0,
+              .most = kWrapPeriodS},
 };
 
 Streams only(std::initializer_list<StreamId> streams) {

@@ -3,11 +3,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <random>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -58,7 +58,7 @@ class RandomStage : public Stage {
     out.push_back(std::move(event));
   }
 
-  void count(StreamId stream) { ++context_.counters->of(fault_.kind, stream); }
+  void count(StreamId stream) const { ++context_.counters->of(fault_.kind, stream); }
   [[nodiscard]] const Fault& fault() const { return fault_; }
 
   /// In [0, 1); the same on every platform.
@@ -118,7 +118,8 @@ class ReorderStage final : public RandomStage {
   void finish(std::vector<Event>& out) override {
     for (auto& held : held_) {
       if (held) {
-        out.push_back(*std::exchange(held, std::nullopt));
+        out.push_back(*std::move(held));
+        held.reset();
       }
     }
   }

@@ -7,10 +7,13 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
@@ -27,7 +30,7 @@ using yaml::Entry;
 constexpr std::string_view kColorFrame = "d400_color_optical_frame";
 constexpr std::string_view kImuFrame = "d400_accelerometer";
 constexpr std::string_view kBaseFrame = "base_link";
-constexpr double kDepthUnit_m = 1e-3;
+constexpr double kDepthUnitM = 1e-3;
 constexpr double kLargestSide = 65535;
 
 /// T_parent_child.
@@ -189,7 +192,7 @@ Result<FoundCalibration> parse_sensors(std::string_view file, std::string conten
   }
   FoundCalibration found;
   found.camera = camera;
-  found.depth_unit_m = kDepthUnit_m;
+  found.depth_unit_m = kDepthUnitM;
   found.depth_alignment = DepthAlignment::kNearestTouching;  // a D435i's, aligned by realsense-ros
   found.source = file;
   return found;
@@ -208,7 +211,8 @@ Result<void> parse_transforms(std::string_view file, std::string content, FoundC
     if (!entry.node.IsSequence()) {
       return tl::unexpected{entry.error("a list is expected")};
     }
-    for (const auto& node : entry.node) {
+    for (const auto& item : entry.node) {
+      const YAML::Node& node = item;
       auto edge = read_edge(Entry{.file = entry.file, .key = entry.key, .node = node});
       if (!edge) {
         return tl::unexpected{std::move(edge.error())};

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -61,10 +63,11 @@ Result<std::optional<StampedVector>> ImuMerge::read(text::LineFile& file) {
   if (!line) {
     return tl::unexpected{std::move(line.error())};
   }
-  if (!*line) {
+  const std::optional<text::Line>& found = *line;
+  if (!found) {
     return std::nullopt;
   }
-  auto parsed = parse_vector((*line)->text);
+  auto parsed = parse_vector(found->text);
   if (!parsed) {
     return tl::unexpected{std::move(parsed.error()).in(file.where())};
   }
@@ -101,7 +104,8 @@ Result<std::optional<Arrival<ImuClock, ImuSample>>> ImuMerge::next() {
     if (auto advanced = advance(gyro_->t); !advanced) {
       return tl::unexpected{std::move(advanced.error())};
     }
-    const StampedVector gyro = *std::exchange(gyro_, std::nullopt);
+    const StampedVector gyro = *gyro_;
+    gyro_.reset();
     if (!after_ || after_->t < gyro.t) {
       continue;
     }

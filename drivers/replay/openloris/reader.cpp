@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
@@ -86,9 +88,12 @@ Result<Survey> survey(const std::filesystem::path& path) {
     return tl::unexpected{std::move(file.error())};
   }
   Survey survey;
-  for (auto line = file->next(); !line || *line; line = file->next()) {
-    const auto parsed = line ? parse_vector((*line)->text) : tl::unexpected{line.error()};
-    if (parsed) {
+  for (auto line = file->next(); !line || line->has_value(); line = file->next()) {
+    const auto found = line.value_or(std::nullopt);
+    if (!found) {
+      continue;
+    }
+    if (const auto parsed = parse_vector(found->text)) {
       ++survey.count;
       survey.first = std::min(survey.first, parsed->t);
       survey.last = std::max(survey.last, parsed->t);
@@ -146,7 +151,9 @@ class Reader final : public RecordingReader {
     }
     const bool images_left = at_ < images_.size();
     if (sample_ && (!images_left || sample_->t_arrival <= images_[at_].t)) {
-      return *std::exchange(sample_, std::nullopt);
+      Event event{*sample_};
+      sample_.reset();
+      return event;
     }
     if (!images_left) {
       return std::nullopt;

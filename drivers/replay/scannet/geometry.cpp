@@ -111,7 +111,7 @@ std::vector<std::byte> ColorResampler::operator()(std::span<const std::byte> ima
     for (const Footprint& columns : columns_) {
       for (std::size_t channel = 0; channel < kChannels; ++channel) {
         const float value = mean_at(columns, mean_row, channel);
-        target.push_back(static_cast<std::byte>(static_cast<int>(value + 0.5F)));
+        target.push_back(static_cast<std::byte>(std::lround(value)));
       }
     }
   }

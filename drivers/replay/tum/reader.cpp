@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -12,6 +13,8 @@
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/imgcodecs.hpp>

@@ -27,7 +27,7 @@ struct BagWriterOptions {
   /// A transaction ends after this much recorded time or this many bytes: what a power cut can
   /// cost.
   Duration commit_after = std::chrono::seconds{1};
-  std::size_t commit_after_bytes = std::size_t{16} << 20U;
+  std::size_t commit_after_bytes = std::size_t{16} * 1024 * 1024;
   /// How the samples to come are stamped; kept in the bag, so that a replay treats them alike.
   StampInfo camera_stamps{};
   StampInfo imu_stamps{};
