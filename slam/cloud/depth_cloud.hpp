@@ -100,6 +100,8 @@ class DepthCloud {
   float sigma_ = 0;      ///< see sigma()
   std::vector<Surfel> surfels_;
   std::vector<float> scratch_;
+  std::vector<Eigen::Vector3f>
+      rays_;  ///< of each surfel: x / z, y / z, 1 / z; 0 where there is none
   std::vector<std::uint32_t> valid_;
   std::vector<Eigen::Vector4f> smoothed_;  ///< normal and tilt variance of each valid surfel
   std::vector<float> columns_;             ///< sums over a row of cells for each image column

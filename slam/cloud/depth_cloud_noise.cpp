@@ -138,6 +138,11 @@ void DepthCloud::measure_noise() {
 /// certain.
 void DepthCloud::smooth_normals() {
   smoothed_.clear();
+  rays_.assign(surfels_.size(), Eigen::Vector3f::Zero());
+  for (const std::uint32_t cell : valid_) {
+    const Eigen::Vector3f& point = surfels_[cell].point;
+    rays_[cell] << point.head<2>() / point.z(), 1.0F / point.z();
+  }
   for (const std::uint32_t cell : valid_) {
     smoothed_.push_back(smoothed_normal(cell));
   }
@@ -156,8 +161,8 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   const Surfel& centre = surfels_[cell];
   Eigen::Vector4f best{centre.normal.x(), centre.normal.y(), centre.normal.z(),
                        centre.tilt_variance};
-  const float q0 = 1.0F / centre.point.z();
-  const Eigen::Vector2f ray0 = q0 * centre.point.head<2>();
+  const float q0 = rays_[cell].z();
+  const Eigen::Vector2f ray0 = rays_[cell].head<2>();
   Eigen::Vector2f slope = centre.normal.head<2>() / centre.normal.dot(centre.point);
   const auto enough = static_cast<float>(config_.normal_sigma_rad * config_.normal_sigma_rad);
   const int columns = grid_->columns();
@@ -168,14 +173,11 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
     for (int r = std::max(row - ring, 0); r <= std::min(row + ring, grid_->rows() - 1); ++r) {
       for (int c = std::max(column - ring, 0); c <= std::min(column + ring, columns - 1); ++c) {
         const bool added = ring > 1 && std::max(std::abs(r - row), std::abs(c - column)) < ring;
-        const Surfel& other = surfels_[static_cast<std::size_t>(r * columns + c)];
-        if (added || !other.valid()) {
-          continue;
-        }
-        const float other_q = 1.0F / other.point.z();
-        const Eigen::Vector2f ray = other_q * other.point.head<2>() - ray0;
-        if (std::abs(other_q - q0 - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
-          plane.add(ray, other_q - q0);
+        const Eigen::Vector3f& other = rays_[static_cast<std::size_t>(r * columns + c)];
+        const Eigen::Vector2f ray = other.head<2>() - ray0;
+        const float q = other.z() - q0;
+        if (!added && other.z() > 0 && std::abs(q - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
+          plane.add(ray, q);
         }
       }
     }

@@ -42,6 +42,26 @@ TEST(GicpDegeneracy, AWallLeavesSlidingAndTurningInItOpen) {
   }
 }
 
+TEST(GicpDegeneracy, ACorridorNeitherHoldsNorPullsAlongItsLength) {
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    const SE3 T = motion({0.002, -0.003, 0.004}, {0.01, -0.01, 0.03});
+    const DepthInformation told = constrained(
+        linearise(view(corridor(), T, 2 * seed), view(corridor(), SE3{}, 2 * seed + 1), SE3{}, {}),
+        {});
+    // The corridor's length in the source's frame, as a translation.
+    Vector6d along = Vector6d::Zero();
+    along.tail<3>() = T.rotation().inverse() * Vector3d{0, 0, 1};
+    const double best = told.H.bottomRightCorner<3, 3>().diagonal().maxCoeff();
+    EXPECT_LT(along.dot(told.H * along), 1e-3 * best);
+    // A step by it and a weak prior moves across, not along.
+    const Matrix6d H = told.H + 1e-4 * best * Matrix6d::Identity();
+    const Vector6d step = -H.ldlt().solve(told.b);
+    EXPECT_NEAR(step[3], T.translation().x(), 3e-3);
+    EXPECT_NEAR(step[4], T.translation().y(), 3e-3);
+    EXPECT_LT(std::abs(step[5]), 3e-3);
+  }
+}
+
 TEST(GicpDegeneracy, ACorridorLeavesItsLengthOpen) {
   for (std::uint64_t seed = 1; seed < 6; ++seed) {
     const SE3 T = motion({0.004, -0.006, 0.01}, {0.02, -0.01, 0.03});

@@ -1,0 +1,109 @@
+#include "odometry/pose_optimiser.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
+
+#include "cloud/gicp.hpp"
+#include "vision/camera_model.hpp"
+
+/// Points in front of a camera, some of which move on their own.
+namespace geoflow::slam {
+namespace {
+
+const CameraModel kCamera{
+    {.width = 640, .height = 480, .fx = 600, .fy = 600, .cx = 319.5, .cy = 239.5}};
+
+/// Matches of `still` points, seen from T_odom_cam, and of `moving` ones that have moved.
+std::vector<VisualMatch> matches(const SE3& T_odom_cam, std::size_t still, std::size_t moving,
+                                 const Vector3d& moved_m) {
+  std::mt19937_64 random{7};
+  std::uniform_real_distribution<double> across{-1.2, 1.2};
+  std::uniform_real_distribution<double> along{2, 5};
+  std::normal_distribution<double> noise_px{0, 0.3};
+  std::vector<VisualMatch> found;
+  for (std::size_t i = 0; i < still + moving; ++i) {
+    const Vector3d p_odom{across(random), across(random), along(random)};
+    const Vector3d now = i < still ? p_odom : Vector3d{p_odom + moved_m};
+    const Vector2d pixel =
+        kCamera.project(T_odom_cam.inverse() * now) + Vector2d{noise_px(random), noise_px(random)};
+    found.push_back({.p_odom = p_odom, .pixel = pixel});
+  }
+  return found;
+}
+
+PosePrior prior_of(const SE3& T_odom_cam, double sigma_rad, double sigma_m) {
+  Vector6d information;
+  information << Vector3d::Constant(1 / (sigma_rad * sigma_rad)),
+      Vector3d::Constant(1 / (sigma_m * sigma_m));
+  return {.T_odom_cam = T_odom_cam, .information = information.asDiagonal()};
+}
+
+class PoseOptimiserTest : public testing::Test {
+ protected:
+  [[nodiscard]] double error_m(const PoseProblem& problem, const SE3& T_odom_cam) const {
+    const PoseSolution solution = optimiser_.solve(problem, problem.prior.T_odom_cam);
+    return (T_odom_cam.inverse() * solution.T_odom_cam).translation().norm();
+  }
+  PoseOptimiser optimiser_{{}, {}, {}, kCamera};
+  SE3 T_odom_cam_{Eigen::Quaterniond{Eigen::AngleAxisd{0.02, Vector3d{0.3, 1, 0}.normalized()}},
+                  Vector3d{0.03, -0.01, 0.05}};
+};
+
+TEST_F(PoseOptimiserTest, FindsThePoseWhateverThePriorSaysWhereMuchIsSeen) {
+  const auto seen = matches(T_odom_cam_, 100, 0, Vector3d::Zero());
+  EXPECT_LT(
+      error_m({.matches = seen, .targets = {}, .prior = prior_of(SE3{}, 0.1, 0.1)}, T_odom_cam_),
+      2e-3);
+}
+
+TEST_F(PoseOptimiserTest, ACrowdThatWalksDoesNotTakeThePoseAlongWhereLegsSayWhereItIs) {
+  // People fill the image: two of three points walk on together by 0.2 m.
+  const auto seen = matches(T_odom_cam_, 30, 60, Vector3d{0.15, 0, 0.13});
+  const PosePrior prior = prior_of(T_odom_cam_, 0.002, 0.003);
+  EXPECT_LT(
+      error_m({.matches = seen, .targets = {}, .prior = prior, .gate_by_prior = true}, T_odom_cam_),
+      2e-3);
+  EXPECT_GT(error_m({.matches = seen, .targets = {}, .prior = prior}, T_odom_cam_), 4e-3);
+}
+
+TEST_F(PoseOptimiserTest, WhatTheGateLeavesOutIsJudgedLikeTheRest) {
+  const auto seen = matches(T_odom_cam_, 40, 20, Vector3d{0.2, 0, 0});
+  const PoseSolution solution = optimiser_.solve({.matches = seen,
+                                                  .targets = {},
+                                                  .prior = prior_of(T_odom_cam_, 0.002, 0.003),
+                                                  .gate_by_prior = true},
+                                                 T_odom_cam_);
+  ASSERT_EQ(solution.inlier.size(), 60U);
+  EXPECT_GE(solution.visual_inliers, 38U);
+  EXPECT_LE(solution.visual_inliers, 42U);
+}
+
+TEST_F(PoseOptimiserTest, TheCovarianceIsThatOfTheErrors) {
+  double normalised = 0;
+  constexpr int kTries = 60;
+  for (int i = 0; i < kTries; ++i) {
+    std::mt19937_64 random{static_cast<std::uint64_t>(i)};
+    std::normal_distribution<double> noise_px{0, 1};
+    auto seen = matches(T_odom_cam_, 80, 0, Vector3d::Zero());
+    for (VisualMatch& match : seen) {
+      match.pixel = kCamera.project(T_odom_cam_.inverse() * match.p_odom) +
+                    Vector2d{noise_px(random), noise_px(random)};
+    }
+    const PoseSolution solution = optimiser_.solve(
+        {.matches = seen, .targets = {}, .prior = prior_of(T_odom_cam_, 1, 1)}, SE3{});
+    const Vector6d error = (T_odom_cam_.inverse() * solution.T_odom_cam).log();
+    normalised += error.dot(solution.covariance.inverse() * error) / 6;
+  }
+  EXPECT_GT(normalised / kTries, 0.7);
+  EXPECT_LT(normalised / kTries, 1.4);
+}
+
+}  // namespace
+}  // namespace geoflow::slam
