@@ -27,9 +27,11 @@
 #include "cloud/gicp.hpp"
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
+#include "map/map_correction.hpp"
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/tracker.hpp"
+#include "place/loop_closer.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -52,6 +54,7 @@ class Core::Impl {
         reckoner_{config.switches, calibration},
         tracker_{config, gicp_, calibration, std::move(grid), observer},
         builder_{config, gicp_, calibration, observer},
+        loop_closer_{config, gicp_, calibration},
         observer_{observer} {}
 
   PoseEstimate process(const SyncedPacket& packet) {
@@ -70,18 +73,39 @@ class Core::Impl {
   }
 
   std::optional<MappingTask> take_mapping_task() {
+    if (std::exchange(loop_found_, false)) {
+      return MappingTask{.problem = nullptr,
+                         .graph = std::make_shared<const PoseGraphProblem>(pose_graph(map_))};
+    }
     if (!pending_) {
       return std::nullopt;
     }
     const KeyframeId newest = *pending_;
     pending_.reset();
-    return builder_.task(map_, newest);
+    MappingTask task = builder_.task(map_, newest);
+    if (config_.switches.loop_closing) {
+      task.loops = loop_closer_.problem(map_, newest);
+    }
+    return task;
   }
 
   void apply(const MappingResult& result) {
-    const SE3 T_odom1_odom0 = builder_.apply(map_, *result.solution);
-    tracker_.current().T_odom_cam = T_odom1_odom0 * tracker_.current().T_odom_cam;
-    motion_.move(T_odom1_odom0);
+    if (result.solution) {
+      move(builder_.apply(map_, *result.solution));
+    }
+    if (result.loops) {
+      for (const DepthEdge& loop : loop_closer_.consider(map_, *result.loops)) {
+        loop_found_ = loop_found_ || moves_map(map_, loop);
+        map_.add_edge(loop);
+      }
+    }
+    if (result.graph) {
+      // The map moves, and the robot in it; where it is in odom stays as it is.
+      if (const std::optional<SE3> T_map1_map0 = correct(map_, *result.graph)) {
+        move(*T_map1_map0);
+        T_map_odom_ = *T_map1_map0 * T_map_odom_;
+      }
+    }
   }
 
   [[nodiscard]] Trajectory final_trajectory() const {
@@ -95,6 +119,13 @@ class Core::Impl {
   }
 
  private:
+  /// Moves what depends on the newest keyframes.
+  void move(const SE3& T_odom1_odom0) {
+    tracker_.current().T_odom_cam = T_odom1_odom0 * tracker_.current().T_odom_cam;
+    motion_.move(T_odom1_odom0);
+    T_odom_cam_ = T_odom1_odom0 * T_odom_cam_;
+  }
+
   /// A frame's pose relative to a keyframe, so that it follows when the keyframe is moved by later
   /// optimisation.
   struct FrameRecord {
@@ -161,16 +192,23 @@ class Core::Impl {
       estimate.status = TrackingStatus::kInitialising;
       return estimate;
     }
-    estimate.T_odom_base = motion_.predict(packet.t).T_odom_cam * T_base_cam_.inverse();
+    place(estimate, motion_.predict(packet.t).T_odom_cam);
     estimate.status = TrackingStatus::kDegraded;
     return estimate;
+  }
+
+  /// The estimator's own frame is the map, though its name within is odom: there is but one. To
+  /// others the odom frame is where it would be had no loop been closed.
+  void place(PoseEstimate& estimate, const SE3& T_map_cam) const {
+    estimate.T_map_odom = T_map_odom_;
+    estimate.T_odom_base = T_map_odom_.inverse() * (T_map_cam * T_base_cam_.inverse());
   }
 
   [[nodiscard]] PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {
     PoseEstimate estimate;
     estimate.t = packet.t;
     estimate.sequence = packet.sequence;
-    estimate.T_odom_base = T_odom_cam * T_base_cam_.inverse();
+    place(estimate, T_odom_cam);
     // The twist of the base in the base, by the adjoint; its translation turned into odom.
     const Vector6d twist_base = T_base_cam_.adjoint() * motion_.velocity();
     estimate.w_base = twist_base.head<3>();
@@ -249,11 +287,14 @@ class Core::Impl {
   DeadReckoner reckoner_;
   Tracker tracker_;
   MapBuilder builder_;
+  LoopCloser loop_closer_;
   MotionModel motion_;
   Map map_;
   KeyframeId reference_{};
   std::optional<KeyframeId> pending_;
   std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
+  bool loop_found_ = false;                       ///< the map is to be corrected
+  SE3 T_map_odom_;                                ///< what closed loops have moved the map by
   std::vector<FrameRecord> records_;
   PoseEstimate last_;
   SE3 T_odom_cam_;                     ///< of the last frame

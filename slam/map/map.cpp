@@ -1,15 +1,34 @@
 #include "map/map.hpp"
 
 #include <cstddef>
+#include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
+
+#include "geoflow/hal/geometry.hpp"
 
 namespace geoflow::slam {
 
 KeyframeId Map::add_keyframe(Keyframe keyframe) {
   const KeyframeId id{next_keyframe_++};
+  if (keyframe.place) {
+    places_.add(id, *keyframe.place);
+  }
   keyframes_.emplace(id, std::move(keyframe));
   return id;
+}
+
+void Map::describe(KeyframeId id, std::shared_ptr<const PlaceView> place) {
+  Keyframe& described = keyframes_.at(id);
+  if (!described.place && place) {
+    places_.add(id, *place);
+    described.place = std::move(place);
+  }
+}
+
+void Map::remove_edges(KeyframeId from, KeyframeId to) {
+  std::erase_if(edges_, [&](const DepthEdge& e) { return e.from == from && e.to == to; });
 }
 
 PointId Map::add_point(MapPoint point) {
@@ -43,6 +62,15 @@ void Map::remove_observation(PointId id, KeyframeId keyframe) {
   std::erase(keyframes_.at(keyframe).points, id);
   if (point->observations.empty()) {
     points_.erase(id);
+  }
+}
+
+void Map::move(const std::function<SE3(KeyframeId)>& T_odom1_odom0) {
+  for (auto& [id, point] : points_) {
+    point.p_odom = T_odom1_odom0(point.observations.front().keyframe) * point.p_odom;
+  }
+  for (auto& [id, keyframe] : keyframes_) {
+    keyframe.T_odom_cam = T_odom1_odom0(id) * keyframe.T_odom_cam;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "geoflow/hal/time.hpp"
 
 #include "cloud/depth_cloud.hpp"
+#include "map/ids.hpp"
+#include "place/place_index.hpp"
 #include "vision/orb_features.hpp"
 
 /// What has been seen, and from where. Value types, thread-compatible; odom is the map's frame.
@@ -17,9 +20,6 @@ namespace geoflow::slam {
 
 class ImagePyramid;
 struct PlaceView;
-
-enum class KeyframeId : std::uint32_t {};
-enum class PointId : std::uint32_t {};
 
 /// One keyframe's view of one map point.
 struct Observation {
@@ -37,8 +37,8 @@ struct MapPoint {
   std::uint32_t found = 0;                ///< of those, frames in which it agreed with the pose
 };
 
-/// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); or
-/// from IMU and legs in between.
+/// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); from
+/// IMU and legs in between; or from both views, where a loop closes.
 struct DepthEdge {
   KeyframeId from;
   KeyframeId to;
@@ -52,7 +52,7 @@ struct Keyframe {
   SE3 T_odom_cam;
   Matrix6d covariance = Matrix6d::Zero();   ///< of T_odom_cam
   std::shared_ptr<const DepthCloud> cloud;  ///< null where the frame had no depth or it was let go
-  std::shared_ptr<const PlaceView> place;   ///< never null
+  std::shared_ptr<const PlaceView> place;   ///< null until describe() gives it
   std::shared_ptr<const ImagePyramid> pyramid;  ///< null where it was let go
   std::vector<PointId> points;                  ///< that it observes
 };
@@ -62,14 +62,21 @@ struct Keyframe {
 class Map {
  public:
   KeyframeId add_keyframe(Keyframe keyframe);
+  /// Gives a keyframe that has none its place, and files it in places().
+  void describe(KeyframeId id, std::shared_ptr<const PlaceView> place);
   PointId add_point(MapPoint point);
   /// Records that a keyframe sees a point (once per pair).
   void observe(PointId point, const Observation& observation);
   void add_edge(const DepthEdge& edge) { edges_.push_back(edge); }
+  /// Forgets all edges between two keyframes, in this direction.
+  void remove_edges(KeyframeId from, KeyframeId to);
   /// Forgets a point and all its observations.
   void remove_point(PointId id);
   /// Forgets one observation; a point left with none goes too.
   void remove_observation(PointId id, KeyframeId keyframe);
+  /// Moves every keyframe by `T_odom1_odom0(id)`, applied on the left, and every point with the
+  /// keyframe that saw it first.
+  void move(const std::function<SE3(KeyframeId)>& T_odom1_odom0);
   /// Lets go of the depth and the images of all but so many newest keyframes: what bounds the
   /// memory.
   void keep_newest(std::size_t clouds, std::size_t pyramids);
@@ -79,6 +86,8 @@ class Map {
   }
   [[nodiscard]] const std::map<PointId, MapPoint>& points() const noexcept { return points_; }
   [[nodiscard]] const std::vector<DepthEdge>& edges() const noexcept { return edges_; }
+  /// By what they look like: the keyframes that have their place.
+  [[nodiscard]] const PlaceIndex& places() const noexcept { return places_; }
   [[nodiscard]] Keyframe& keyframe(KeyframeId id) { return keyframes_.at(id); }
   [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return keyframes_.at(id); }
   /// Null where the point is no more.
@@ -89,6 +98,7 @@ class Map {
   std::map<KeyframeId, Keyframe> keyframes_;
   std::map<PointId, MapPoint> points_;
   std::vector<DepthEdge> edges_;
+  PlaceIndex places_;
   std::uint32_t next_keyframe_ = 0;
   std::uint32_t next_point_ = 0;
 };

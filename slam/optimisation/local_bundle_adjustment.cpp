@@ -18,6 +18,8 @@
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
 #include "optimisation/factors.hpp"
+#include "optimisation/pose_graph.hpp"
+#include "place/loop_closer.hpp"
 #include "vision/camera_model.hpp"
 
 namespace geoflow::slam {
@@ -198,7 +200,18 @@ class LocalBundleAdjustment {
 
 MappingResult optimise(const MappingTask& task, StageObserver* observer) {
   const StageScope scope{observer, Stage::kMapping};
-  return {std::make_shared<const MappingSolution>(LocalBundleAdjustment{*task.problem}.solve())};
+  MappingResult result;
+  if (task.problem) {
+    result.solution =
+        std::make_shared<const MappingSolution>(LocalBundleAdjustment{*task.problem}.solve());
+  }
+  if (task.loops) {
+    result.loops = std::make_shared<const LoopSolution>(verify_loops(*task.loops));
+  }
+  if (task.graph) {
+    result.graph = std::make_shared<const PoseGraphSolution>(solve_pose_graph(*task.graph));
+  }
+  return result;
 }
 
 }  // namespace geoflow::slam

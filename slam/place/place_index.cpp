@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "map/map.hpp"
+#include "map/ids.hpp"
 #include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 
@@ -110,12 +110,10 @@ bool PlaceIndex::add(KeyframeId keyframe, const PlaceView& view) {
     return false;
   }
   if (free_slots_.empty()) {
-    free_slots_.push_back(static_cast<Slot>(keyframes_.size()));
-    keyframes_.push_back(keyframe);
+    free_slots_.push_back(slots_made_++);
   }
   const Slot slot = free_slots_.back();
   free_slots_.pop_back();
-  keyframes_[slot] = keyframe;
   slots_.emplace(keyframe, slot);
   for (const OrbFeature& feature : view.features) {
     for (std::size_t table = 0; table < kTables; ++table) {
@@ -155,7 +153,7 @@ void PlaceIndex::collect(std::span<const Posting> bucket, std::uint32_t signatur
 }
 
 std::vector<PlaceCandidate> PlaceIndex::query(const PlaceView& view, std::size_t most) const {
-  Votes votes{keyframes_.size()};
+  Votes votes{slots_made_};
   const auto all = static_cast<double>(slots_.size());
   for (const OrbFeature& feature : view.features) {
     votes.begin_feature();
@@ -190,17 +188,12 @@ std::size_t PlaceIndex::memory_bytes() const noexcept {
 std::vector<PlaceCandidate> peaks(const std::vector<PlaceCandidate>& ranking, std::size_t most,
                                   std::uint32_t apart) {
   std::vector<PlaceCandidate> chosen;
-  const auto distance = [](KeyframeId a, KeyframeId b) {
-    const auto x = static_cast<std::uint32_t>(a);
-    const auto y = static_cast<std::uint32_t>(b);
-    return x > y ? x - y : y - x;
-  };
   for (const PlaceCandidate& candidate : ranking) {
     if (chosen.size() == most) {
       break;
     }
     if (std::ranges::none_of(chosen, [&](const PlaceCandidate& better) {
-          return distance(better.keyframe, candidate.keyframe) <= apart;
+          return ids_apart(better.keyframe, candidate.keyframe) <= apart;
         })) {
       chosen.push_back(candidate);
     }

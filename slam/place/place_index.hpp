@@ -6,10 +6,12 @@
 #include <span>
 #include <vector>
 
-#include "map/map.hpp"
-#include "vision/place_view.hpp"
+#include "map/ids.hpp"
+#include "vision/orb_features.hpp"
 
 namespace geoflow::slam {
+
+struct PlaceView;
 
 /// A keyframe whose view may show the place that was asked for.
 struct PlaceCandidate {
@@ -76,7 +78,7 @@ class PlaceIndex {
   static void collect(std::span<const Posting> bucket, std::uint32_t signature, Votes& votes);
 
   std::vector<std::vector<Posting>> buckets_;  ///< of all tables
-  std::vector<KeyframeId> keyframes_;          ///< of each slot
+  Slot slots_made_ = 0;
   std::vector<Slot> free_slots_;
   std::map<KeyframeId, Slot> slots_;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -13,16 +14,20 @@
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "place/place_index.hpp"
 #include "vision/dual_stream_flow.hpp"
+#include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 #include "vision/pnp.hpp"
 
 namespace geoflow::slam {
 namespace {
 
-/// Newest keyframes whose features are compared; and those whose depth is searched, which takes
-/// longer.
-constexpr std::size_t kNewestByFeatures = 30;
+/// Newest keyframes whose features are compared; further ones, of all, that look most like the
+/// frame, one for each stretch of so many; and those whose depth is searched, which takes longer.
+constexpr std::size_t kNewestByFeatures = 6;
+constexpr std::size_t kAlikeByFeatures = 12;
+constexpr std::uint32_t kStretch = 1;
 constexpr std::size_t kNewestByDepth = 3;
 /// A pose found from pairs of descriptors is a hypothesis when so many of them agree with it.
 constexpr PnpEffort kHypothesis{.least_inliers = 8, .least_inlier_share = 0.2, .iterations = 400};
@@ -42,6 +47,9 @@ constexpr double kDepthConfirms = 0.9;
 /// A pose that depth found has the support of the features when as many pairs of descriptors as a
 /// hypothesis needs lie within this of where it puts them [px].
 constexpr double kSupportPx = 8;
+/// Without an image to follow them from, points are looked for within this of where a hypothesis
+/// puts them [px].
+constexpr double kSearchedPx = 10;
 /// Followed points further from where the confirmed pose puts them are wrong [px].
 constexpr double kFollowedPx = 5;
 /// With so many followed the search ends.
@@ -145,11 +153,39 @@ std::vector<FlowSeed> Relocaliser::seeds(const Map& map, KeyframeId id,
   return seeds;
 }
 
+std::vector<std::optional<Vector2d>> Relocaliser::find_points(const Map& map, const Frame& frame,
+                                                              KeyframeId id,
+                                                              const SE3& T_odom_cam) const {
+  const Keyframe& keyframe = map.keyframe(id);
+  const std::vector<FlowSeed> sought = seeds(map, id, T_odom_cam);
+  if (keyframe.pyramid) {
+    return flow_.track(*keyframe.pyramid, *frame.pyramid, sought);
+  }
+  std::vector<ExpectedFeature> expected;
+  std::vector<std::size_t> point_of;
+  for (std::size_t i = 0; i < sought.size(); ++i) {
+    if (sought[i].predicted) {
+      expected.push_back({*sought[i].predicted, map.find_point(keyframe.points[i])->descriptor});
+      point_of.push_back(i);
+    }
+  }
+  const std::vector<int> match = match_by_projection(expected, frame.place->features, kSearchedPx);
+  std::vector<std::optional<Vector2d>> tracks(sought.size());
+  for (std::size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0) {
+      tracks[point_of[i]] = frame.place->features[static_cast<std::size_t>(match[i])].pixel;
+    }
+  }
+  return tracks;
+}
+
 std::optional<Relocation> Relocaliser::confirmed(const Map& map, const Frame& frame, KeyframeId id,
                                                  const Hypothesis& hypothesis) const {
   const Keyframe& keyframe = map.keyframe(id);
-  const auto tracks =
-      flow_.track(*keyframe.pyramid, *frame.pyramid, seeds(map, id, hypothesis.T_odom_cam));
+  if (!keyframe.pyramid && !hypothesis.certain) {
+    return std::nullopt;
+  }
+  const auto tracks = find_points(map, frame, id, hypothesis.T_odom_cam);
   std::vector<VisualMatch> matches;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (tracks[i]) {
@@ -160,7 +196,7 @@ std::optional<Relocation> Relocaliser::confirmed(const Map& map, const Frame& fr
   Relocation found{id, hypothesis.T_odom_cam, {}};
   if (const auto solution = solve_pnp(matches, camera_, config_.pose, kConfirmation)) {
     found.T_odom_cam = solution->T_odom_cam;
-  } else if (!hypothesis.certain) {
+  } else if (!hypothesis.certain || !keyframe.pyramid) {
     return std::nullopt;
   }
   if (!depth_agrees(frame, keyframe, found.T_odom_cam)) {
@@ -214,28 +250,46 @@ std::optional<Relocation> Relocaliser::by_depth(const Map& map, const Frame& fra
   return Relocation{id, T_odom_cam, {}};
 }
 
+std::vector<KeyframeId> Relocaliser::candidates(const Map& map, const Frame& frame) {
+  std::vector<KeyframeId> chosen;
+  for (auto it = map.keyframes().rbegin();
+       it != map.keyframes().rend() && chosen.size() < kNewestByFeatures; ++it) {
+    if (it->second.place) {
+      chosen.push_back(it->first);
+    }
+  }
+  const auto ranking = map.places().query(*frame.place, map.places().size());
+  for (const PlaceCandidate& candidate : peaks(ranking, kAlikeByFeatures, kStretch)) {
+    if (std::find(chosen.begin(), chosen.end(), candidate.keyframe) == chosen.end()) {
+      chosen.push_back(candidate.keyframe);
+    }
+  }
+  return chosen;
+}
+
 std::optional<Relocation> Relocaliser::find(const Map& map, const Frame& frame,
                                             const SE3& T_odom_cam_guess) const {
   std::optional<Relocation> best;
-  std::size_t tried = 0;
   const auto better = [&](const std::optional<Relocation>& found) {
     if (found && (!best || found->tracks.size() > best->tracks.size())) {
       best = found;
     }
   };
-  for (auto it = map.keyframes().rbegin();
-       it != map.keyframes().rend() && it->second.pyramid && tried < kNewestByFeatures &&
-       (!best || best->tracks.size() < kPlenty);
-       ++it, ++tried) {
-    if (const auto hypothesis = by_features(frame, it->second)) {
-      better(confirmed(map, frame, it->first, *hypothesis));
+  for (const KeyframeId id : candidates(map, frame)) {
+    const auto hypothesis = by_features(frame, map.keyframe(id));
+    if (hypothesis) {
+      better(confirmed(map, frame, id, *hypothesis));
+    }
+    if (best && best->tracks.size() >= kPlenty) {
+      return best;
     }
   }
-  tried = 0;
+  std::size_t tried = 0;
   for (auto it = map.keyframes().rbegin();
-       !best && it != map.keyframes().rend() && it->second.pyramid && tried < kNewestByDepth;
-       ++it, ++tried) {
-    better(by_depth(map, frame, it->first, T_odom_cam_guess));
+       !best && it != map.keyframes().rend() && tried < kNewestByDepth; ++it, ++tried) {
+    if (it->second.place) {
+      better(by_depth(map, frame, it->first, T_odom_cam_guess));
+    }
   }
   return best;
 }

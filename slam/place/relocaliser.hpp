@@ -34,13 +34,15 @@ class Relocaliser {
   Relocaliser(const Config& config, const GicpConfig& gicp, const CameraModel& camera)
       : config_{config}, gicp_{gicp}, camera_{camera}, flow_{config.flow, camera_} {}
 
-  /// Looks in the newest keyframes for hypotheses: pairs of descriptors give one by P3P with RANSAC
-  /// on the keyframe's depth; where none does, registration of depth from `T_odom_cam_guess` and
-  /// around it does. A hypothesis is believed when the keyframe's map points, projected with it,
-  /// are found by optical flow from the keyframe's image and agree on one pose, or the two views'
-  /// depth lies on one surface nearly everywhere and leaves no direction open. Where there are no
-  /// points to follow, the depth has to fit nearly everywhere and to leave no direction open. The
-  /// frame must have its PlaceView.
+  /// Looks for hypotheses in the newest few keyframes and, of all, those that look most like the
+  /// frame: pairs of descriptors give one by P3P with RANSAC on the keyframe's depth; where none
+  /// does, registration of depth to the newest from `T_odom_cam_guess` and around it does. A
+  /// hypothesis is believed when the keyframe's map points, projected with it, are found by optical
+  /// flow from the keyframe's image and agree on one pose, or the two views' depth lies on one
+  /// surface nearly everywhere and leaves no direction open. Where the keyframe's image was let go,
+  /// its points are looked for by their descriptors, and both is asked for: these are no witnesses
+  /// of their own. Where there are no points to follow, the depth has to fit nearly everywhere and
+  /// to leave no direction open. The frame must have its PlaceView.
   [[nodiscard]] std::optional<Relocation> find(const Map& map, const Frame& frame,
                                                const SE3& T_odom_cam_guess) const;
 
@@ -49,6 +51,8 @@ class Relocaliser {
     SE3 T_odom_cam;
     bool certain = false;  ///< needs no confirmation by flow
   };
+  /// Keyframes to be tried, in this order.
+  [[nodiscard]] static std::vector<KeyframeId> candidates(const Map& map, const Frame& frame);
   /// Features of the keyframe, in place, that look like features of the frame.
   [[nodiscard]] std::vector<VisualMatch> pairs(const Frame& frame, const Keyframe& keyframe) const;
   [[nodiscard]] static bool depth_confirms(const Frame& frame, const Keyframe& keyframe,
@@ -63,6 +67,11 @@ class Relocaliser {
   /// Where the keyframe's points are in its image, and should be in the frame's.
   [[nodiscard]] std::vector<FlowSeed> seeds(const Map& map, KeyframeId id,
                                             const SE3& T_odom_cam) const;
+  /// Where the keyframe's points are found in the frame, by flow or, without the keyframe's image,
+  /// by descriptors; raw pixels.
+  [[nodiscard]] std::vector<std::optional<Vector2d>> find_points(const Map& map, const Frame& frame,
+                                                                 KeyframeId id,
+                                                                 const SE3& T_odom_cam) const;
   [[nodiscard]] std::optional<Relocation> confirmed(const Map& map, const Frame& frame,
                                                     KeyframeId id,
                                                     const Hypothesis& hypothesis) const;

@@ -19,6 +19,7 @@ struct Switches {
   bool imu = true;  ///< the IMU predicts motion, where its place on the camera is known (IV-B)
   bool legs =
       true;  ///< so do legs or body velocities, where the camera's place on the robot is known
+  bool loop_closing = true;  ///< places known again correct the map
 };
 
 // NOLINTBEGIN(readability-magic-numbers): each number is the value of a member that names it

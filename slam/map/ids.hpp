@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+namespace geoflow::slam {
+
+enum class KeyframeId : std::uint32_t {};
+enum class PointId : std::uint32_t {};
+
+/// How many keyframes lie between two, the later one counted.
+[[nodiscard]] constexpr std::uint32_t ids_apart(KeyframeId a, KeyframeId b) noexcept {
+  const auto x = static_cast<std::uint32_t>(a);
+  const auto y = static_cast<std::uint32_t>(b);
+  return x > y ? x - y : y - x;
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,334 @@
+#include "place/loop_closer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/gicp.hpp"
+#include "map/map.hpp"
+#include "map/overlap.hpp"
+#include "odometry/pose_optimiser.hpp"
+#include "place/place_index.hpp"
+#include "vision/camera_model.hpp"
+#include "vision/orb_features.hpp"
+#include "vision/place_view.hpp"
+#include "vision/pnp.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+/// Keyframes so close in time are no loop.
+constexpr std::uint32_t kRecent = 20;
+/// A keyframe's link with the past is that of the last few, for it is tied to these.
+constexpr std::uint32_t kTied = 5;
+/// Keyframes are linked by so many common points, as many as make a visual fix; and with their
+/// neighbours, which see the same.
+constexpr int kLinkingPoints = 15;
+constexpr std::uint32_t kNeighbours = 10;
+/// Candidates compared, one for each stretch of so many keyframes.
+constexpr std::size_t kCandidates = 3;
+constexpr std::uint32_t kStretch = 3;
+/// A candidate that looks less alike, in respect of the keyframe before, is none.
+constexpr double kLeastAlike = 0.15;
+
+/// A pose from pairs of descriptors.
+constexpr PnpEffort kHypothesis{.least_inliers = 12, .least_inlier_share = 0.25, .iterations = 400};
+/// With it, features are looked for so far from where it puts them [px].
+constexpr double kGuidedPx = 10;
+/// So many have to agree with the refined pose, and this share of those found near it; more where
+/// the depth of one view is gone; and beyond doubt with still more.
+constexpr std::uint32_t kInliers = 30;
+constexpr std::uint32_t kInliersWithoutDepth = 60;
+constexpr std::uint32_t kInliersBeyondDoubt = 120;
+constexpr double kInlierShare = 0.5;
+/// The depth seen in both views, as a share of each; and of that, what lies on one surface.
+constexpr double kSeen = 0.3;
+constexpr double kAgreeing = 0.85;
+constexpr double kSeenBeyondDoubt = 0.5;
+constexpr double kAgreeingBeyondDoubt = 0.95;
+/// A pose less certain than this leaves a direction open (standard deviations).
+constexpr double kOpenM = 0.05;
+constexpr double kOpenRad = 0.03;
+
+/// So many keyframes, among the last so many, have to find the same, to within this.
+constexpr std::size_t kAgree = 3;
+constexpr std::uint32_t kAmongLast = 8;
+constexpr double kSameM = 0.1;
+constexpr double kSameRad = 0.05;
+/// What odometry can have drifted on the way: to begin with, and with the way.
+constexpr double kDriftM = 0.3;
+constexpr double kDriftMPerM = 0.05;
+constexpr double kDriftRad = 0.15;
+constexpr double kDriftRadPerM = 0.02;
+
+/// Compares one new view with old ones.
+class Verifier {
+ public:
+  explicit Verifier(const LoopProblem& problem)
+      : problem_{problem},
+        camera_{problem.camera},
+        optimiser_{problem.config.pose, problem.config.mapping, problem.gicp, camera_} {}
+
+  [[nodiscard]] std::optional<LoopHypothesis> compare(const LoopView& old) const {
+    const auto start = solve_pnp(pairs(old), camera_, problem_.config.pose, kHypothesis);
+    if (!start) {
+      return std::nullopt;
+    }
+    // The old camera's frame stands where PnP and optimiser have odom.
+    const SE3 T_old_new = registered(old, start->T_odom_cam);
+    const std::vector<VisualMatch> matches = guided(old, T_old_new);
+    std::vector<DepthTarget> targets;
+    const bool depth = problem_.newest.cloud && old.cloud;
+    if (depth) {
+      targets.push_back({old.cloud.get(), SE3{}});
+    }
+    PosePrior prior{T_old_new, Matrix6d::Identity()};  // a radian, a metre: nothing
+    const PoseSolution solution = optimiser_.solve({.matches = matches,
+                                                    .cloud = problem_.newest.cloud.get(),
+                                                    .targets = targets,
+                                                    .prior = prior},
+                                                   T_old_new);
+    const Vector6d variance = solution.covariance.diagonal();
+    const double share = static_cast<double>(solution.visual_inliers) /
+                         std::max(1.0, static_cast<double>(matches.size()));
+    if (share < kInlierShare || variance.head<3>().maxCoeff() > kOpenRad * kOpenRad ||
+        variance.tail<3>().maxCoeff() > kOpenM * kOpenM ||
+        solution.visual_inliers < (depth ? kInliers : kInliersWithoutDepth)) {
+      return std::nullopt;
+    }
+    const SE3& T_old_new1 = solution.T_odom_cam;  // frames: the old camera stands for odom
+    if (depth && !agrees(old, T_old_new1, kSeen, kAgreeing)) {
+      return std::nullopt;
+    }
+    return LoopHypothesis{
+        .edge = {old.id, problem_.newest.id, T_old_new1, solution.covariance.inverse()},
+        .certain = depth && solution.visual_inliers >= kInliersBeyondDoubt &&
+                   agrees(old, T_old_new1, kSeenBeyondDoubt, kAgreeingBeyondDoubt)};
+  }
+
+ private:
+  [[nodiscard]] VisualMatch match(const LoopView& old, std::size_t in_new,
+                                  std::size_t in_old) const {
+    const PlaceView& seen = *problem_.newest.place;
+    return {old.place->p_cam[in_old], camera_.undistort(seen.features[in_new].pixel),
+            seen.p_cam[in_new].z()};
+  }
+
+  [[nodiscard]] std::vector<VisualMatch> pairs(const LoopView& old) const {
+    std::vector<VisualMatch> matches;
+    for (const PlaceMatch& pair : match_places(*problem_.newest.place, *old.place)) {
+      if (old.place->p_cam[pair.b].z() > 0) {
+        matches.push_back(match(old, pair.a, pair.b));
+      }
+    }
+    return matches;
+  }
+
+  /// By depth, where that goes no further than what few features leave uncertain.
+  [[nodiscard]] SE3 registered(const LoopView& old, const SE3& T_old_new) const {
+    constexpr double kFarM = 0.2;
+    constexpr double kFarRad = 0.15;
+    if (!problem_.newest.cloud || !old.cloud) {
+      return T_old_new;
+    }
+    const RegistrationResult found =
+        register_clouds(*problem_.newest.cloud, *old.cloud, T_old_new, problem_.gicp);
+    const SE3& T_old_new1 = found.T_target_source;
+    const Vector6d moved = (T_old_new.inverse() * T_old_new1).log();
+    const bool near = moved.head<3>().norm() < kFarRad && moved.tail<3>().norm() < kFarM;
+    return found.inliers > 0 && near ? T_old_new1 : T_old_new;
+  }
+
+  [[nodiscard]] std::vector<VisualMatch> guided(const LoopView& old, const SE3& T_old_new) const {
+    const SE3 T_new_old = T_old_new.inverse();
+    std::vector<ExpectedFeature> expected;
+    std::vector<std::size_t> in_old;
+    for (std::size_t i = 0; i < old.place->features.size(); ++i) {
+      const Vector3d p_new = T_new_old * old.place->p_cam[i];  // frames: of the old camera
+      if (old.place->p_cam[i].z() > 0 && p_new.z() > 0) {
+        expected.push_back(
+            {camera_.distort(camera_.project(p_new)), old.place->features[i].descriptor});
+        in_old.push_back(i);
+      }
+    }
+    const std::vector<int> found =
+        match_by_projection(expected, problem_.newest.place->features, kGuidedPx);
+    std::vector<VisualMatch> matches;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (found[i] >= 0) {
+        matches.push_back(match(old, static_cast<std::size_t>(found[i]), in_old[i]));
+      }
+    }
+    return matches;
+  }
+
+  [[nodiscard]] bool agrees(const LoopView& old, const SE3& T_old_new, double seen,
+                            double agreeing) const {
+    const auto enough = [&](const DepthAgreement& depth) {
+      return depth.seen >= seen && depth.agreeing >= agreeing * depth.seen;
+    };
+    return enough(depth_agreement(*problem_.newest.cloud, *old.cloud, T_old_new)) &&
+           enough(depth_agreement(*old.cloud, *problem_.newest.cloud, T_old_new.inverse()));
+  }
+
+  const LoopProblem& problem_;
+  CameraModel camera_;
+  PoseOptimiser optimiser_;
+};
+
+/// Keyframes that hang together with one of the newest few, by points or edges.
+std::set<KeyframeId> linked(const Map& map, KeyframeId newest) {
+  std::map<KeyframeId, int> common;
+  const auto tied = [&](KeyframeId id) { return ids_apart(id, newest) < kTied && id <= newest; };
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
+    for (const PointId point : tied(it->first) ? it->second.points : std::vector<PointId>{}) {
+      for (const Observation& observation : map.find_point(point)->observations) {
+        ++common[observation.keyframe];
+      }
+    }
+  }
+  std::set<KeyframeId> found;
+  for (const auto& [id, points] : common) {
+    if (points >= kLinkingPoints) {
+      found.insert(id);
+    }
+  }
+  for (const DepthEdge& edge : map.edges()) {
+    if (tied(edge.from) || tied(edge.to)) {
+      found.insert(edge.from);
+      found.insert(edge.to);
+    }
+  }
+  return found;
+}
+
+LoopView view_of(const Map& map, KeyframeId id) {
+  const Keyframe& keyframe = map.keyframe(id);
+  return {id, keyframe.place, keyframe.cloud};
+}
+
+/// Length of the way between two keyframes [m].
+double way_between(const Map& map, KeyframeId from, KeyframeId to) {
+  double way_m = 0;
+  auto it = map.keyframes().find(from);
+  for (auto next = std::next(it); next != map.keyframes().end() && it->first < to; ++it, ++next) {
+    way_m += (next->second.T_odom_cam.translation() - it->second.T_odom_cam.translation()).norm();
+  }
+  return way_m;
+}
+
+/// What a loop says of where its new keyframe is.
+SE3 pose_by(const Map& map, const DepthEdge& loop) {
+  const SE3& T_odom_from = map.keyframe(loop.from).T_odom_cam;
+  const SE3& T_from_to = loop.T_from_to;
+  return T_odom_from * T_from_to;
+}
+
+bool is_possible(const Map& map, const DepthEdge& loop) {
+  const double way_m = way_between(map, loop.from, loop.to);
+  const SE3& T_odom_new = map.keyframe(loop.to).T_odom_cam;
+  const SE3 T_odom_new1 = pose_by(map, loop);
+  const Vector6d drift = (T_odom_new.inverse() * T_odom_new1).log();
+  return drift.tail<3>().norm() < kDriftM + kDriftMPerM * way_m &&
+         drift.head<3>().norm() < kDriftRad + kDriftRadPerM * way_m;
+}
+
+/// Whether two loops put the later's new keyframe at one place, by the way between them.
+bool say_the_same(const Map& map, const DepthEdge& a, const DepthEdge& b) {
+  const SE3& T_odom_newa = map.keyframe(a.to).T_odom_cam;
+  const SE3& T_odom_newb = map.keyframe(b.to).T_odom_cam;
+  const SE3 T_odom_newb1 = pose_by(map, a) * (T_odom_newa.inverse() * T_odom_newb);
+  const SE3 T_odom_newb2 = pose_by(map, b);
+  const Vector6d apart = (T_odom_newb1.inverse() * T_odom_newb2).log();
+  return apart.tail<3>().norm() < kSameM && apart.head<3>().norm() < kSameRad;
+}
+
+}  // namespace
+
+LoopSolution verify_loops(const LoopProblem& problem) {
+  const Verifier verifier{problem};
+  LoopSolution solution;
+  for (const LoopView& candidate : problem.candidates) {
+    if (const auto found = verifier.compare(candidate)) {
+      solution.found.push_back(*found);
+    }
+  }
+  return solution;
+}
+
+std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeId newest) const {
+  if (!map.keyframe(newest).place) {
+    return nullptr;
+  }
+  std::vector<PlaceCandidate> ranking =
+      map.places().query(*map.keyframe(newest).place, map.places().size());
+  double alike = 0;  // the best of the keyframes that must look alike
+  for (const PlaceCandidate& candidate : ranking) {
+    if (candidate.keyframe != newest && ids_apart(candidate.keyframe, newest) <= kTied) {
+      alike = std::max(alike, candidate.score);
+    }
+  }
+  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
+    return candidate.keyframe > newest || ids_apart(candidate.keyframe, newest) <= kRecent ||
+           candidate.score < kLeastAlike * alike;
+  });
+  if (ranking.empty()) {
+    return nullptr;
+  }
+  const std::set<KeyframeId> links = linked(map, newest);
+  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
+    return std::any_of(links.begin(), links.end(), [&](KeyframeId id) {
+      return ids_apart(id, candidate.keyframe) <= kNeighbours;
+    });
+  });
+  auto problem = std::make_shared<LoopProblem>();
+  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
+    problem->candidates.push_back(view_of(map, candidate.keyframe));
+  }
+  problem->newest = view_of(map, newest);
+  problem->camera = camera_;
+  problem->config = config_;
+  problem->gicp = gicp_;
+  return problem->candidates.empty() ? nullptr : problem;
+}
+
+std::vector<DepthEdge> LoopCloser::consider(const Map& map, const LoopSolution& solution) {
+  std::vector<DepthEdge> believed;
+  for (const LoopHypothesis& found : solution.found) {
+    if (!is_possible(map, found.edge)) {
+      continue;
+    }
+    std::erase_if(waiting_, [&](const LoopHypothesis& other) {
+      return ids_apart(other.edge.to, found.edge.to) > kAmongLast;
+    });
+    std::map<KeyframeId, DepthEdge> agreeing{{found.edge.to, found.edge}};
+    for (const LoopHypothesis& other : waiting_) {
+      if (say_the_same(map, other.edge, found.edge)) {
+        agreeing.emplace(other.edge.to, other.edge);
+      }
+    }
+    waiting_.push_back(found);
+    if (believed.empty() && (found.certain || agreeing.size() >= kAgree)) {
+      std::transform(agreeing.begin(), agreeing.end(), std::back_inserter(believed),
+                     [](const auto& keyframe_and_edge) { return keyframe_and_edge.second; });
+    }
+  }
+  if (!believed.empty()) {
+    waiting_.clear();
+  }
+  return believed;
+}
+
+}  // namespace geoflow::slam

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
+
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
+#include "map/map.hpp"
+#include "vision/place_view.hpp"
+
+/// What goes into and comes out of the search for loops of one keyframe: plain snapshots, so that
+/// it can run in any thread.
+namespace geoflow::slam {
+
+/// What a keyframe saw, without where it was.
+struct LoopView {
+  KeyframeId id{};
+  std::shared_ptr<const PlaceView> place;
+  std::shared_ptr<const DepthCloud> cloud;  ///< null: none, or let go
+};
+
+/// A keyframe and old ones that look like it.
+struct LoopProblem {
+  LoopView newest;
+  std::vector<LoopView> candidates;
+  CameraIntrinsics camera;
+  Config config;
+  GicpConfig gicp;
+};
+
+/// Two views of one place, so far as they themselves can tell.
+struct LoopHypothesis {
+  DepthEdge edge;        ///< from the old keyframe to the new one
+  bool certain = false;  ///< needs no others that say the same
+};
+
+struct LoopSolution {
+  std::vector<LoopHypothesis> found;
+};
+
+}  // namespace geoflow::slam
