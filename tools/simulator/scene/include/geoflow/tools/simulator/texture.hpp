@@ -10,7 +10,7 @@
 namespace geoflow::simulator {
 
 /// The luminance of linear sRGB primaries (ITU-R BT.709).
-[[nodiscard]] constexpr float luminance(const Rgb& colour) noexcept {
+[[nodiscard]] inline float luminance(const Rgb& colour) noexcept {
   constexpr float kRed = 0.2126F;
   constexpr float kGreen = 0.7152F;
   constexpr float kBlue = 0.0722F;
