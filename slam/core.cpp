@@ -36,8 +36,6 @@
 namespace geoflow::slam {
 namespace {
 
-/// Share of a frame's depth that has to agree with the map to be a fix by itself.
-constexpr double kDepthCarriesOn = 0.5;
 /// A frame that follows from the one before but has not been found in the map for so long begins a
 /// new part of it, tied to the old one by nothing but what was dead-reckoned in between.
 constexpr int kLostFrames = 15;
@@ -151,8 +149,7 @@ class Core::Impl {
     const TrackingResult result =
         tracker_.track(map_, motion_.predict(packet.t, motion), source_of(motion));
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
-    const bool depth_fix = result.depth_share > kDepthCarriesOn;
-    const bool fixed = result.anchored && (result.visual_fix || depth_fix);
+    const bool fixed = result.anchored && (result.visual_fix || result.depth_fix);
     frames_lost_ = fixed ? 0 : frames_lost_ + 1;
     const bool begin_anew = frames_lost_ > kLostFrames && result.sure;
     if (begin_anew) {
@@ -243,7 +240,7 @@ class Core::Impl {
     constexpr double kPlentyOfPoints = 100;
     constexpr double kFull = 100;
     const double visual = std::min(1.0, result.solution.visual_inliers / kPlentyOfPoints);
-    const double depth = result.depth_share > kDepthCarriesOn ? result.overlap : 0;
+    const double depth = result.depth_fix ? result.overlap : 0;
     return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
   }
 
@@ -261,8 +258,7 @@ class Core::Impl {
     return moved.tail<3>().norm() > config_.keyframes.translation_m ||
            moved.head<3>().norm() > config_.keyframes.rotation_rad ||
            (new_view && share < config_.keyframes.overlap / 2) ||
-           (new_view && result.depth_share > kDepthCarriesOn &&
-            result.overlap < config_.keyframes.overlap) ||
+           (new_view && result.depth_fix && result.overlap < config_.keyframes.overlap) ||
            packet.t - reference.t > config_.keyframes.maximum_interval;
   }
 

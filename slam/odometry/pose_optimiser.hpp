@@ -38,7 +38,7 @@ struct PoseProblem {
   std::span<const VisualMatch> matches;
   const DepthCloud* cloud = nullptr;  ///< the frame's own depth; null: none
   std::span<const DepthTarget> targets;
-  PosePrior prior;  ///< the motion model's prediction: decides only what nothing else sees
+  PosePrior prior;  ///< the prediction: decides what nothing else sees
   /// Leaves out matches that contradict the prior, for one that legs and IMU make: things that move
   /// by themselves, and mirror images.
   bool gate_by_prior = false;

@@ -39,6 +39,8 @@ namespace {
 
 /// A frame is registered to keyframes that see at least this share of its depth.
 constexpr double kTargetOverlap = 0.5;
+/// Share of a frame's depth that has to agree with the map to be a fix by itself.
+constexpr double kDepthCarriesOn = 0.5;
 
 }  // namespace
 
@@ -281,8 +283,9 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
 TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predicted_by) {
   TrackingResult result;
   const bool blind = is_blind(prior);
-  // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image.
-  const bool reckoned = predicted_by == PoseSource::kLegs;
+  // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image. But they
+  // drift, so that a camera which sees again has to be looked for in the map.
+  const bool reckoned = predicted_by == PoseSource::kLegs && fixed_;
   const InitialPose initial = first_guess(
       map, {.T_odom_cam = prior.T_odom_cam, .source = predicted_by, .sure = reckoned}, blind);
   result.source = initial.source;
@@ -308,6 +311,8 @@ TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predi
   result.visual_fix = result.solution.visual_inliers >= enough;
   result.depth_share = static_cast<double>(result.solution.depth_inliers) /
                        std::max(1.0, static_cast<double>(result.solution.depth_surfels));
+  result.depth_fix = result.depth_share > kDepthCarriesOn;
+  fixed_ = result.visual_fix || result.depth_fix;
   return result;
 }
 

@@ -26,8 +26,11 @@ struct TrackingResult {
   PoseSolution solution;
   PoseSource source = PoseSource::kNone;
   bool visual_fix = false;  ///< enough map points agree with the pose
-  bool sure = false;        ///< the first guess was checked by enough of what it was made from
-  bool anchored = false;    ///< the pose hangs together with the map (Frame::anchored)
+  bool depth_fix = false;   ///< enough of the frame's depth agrees with the pose
+  /// The first guess was checked by enough of what it was made from, or legs made it from a frame
+  /// that something seen had fixed.
+  bool sure = false;
+  bool anchored = false;  ///< the pose hangs together with the map (Frame::anchored)
   /// Of the pose in respect of the map, or, where it is not anchored, of the frame before.
   Matrix6d covariance = Matrix6d::Zero();
   double depth_share = 0;  ///< share of the frame's depth that agrees with the map, 0 to 1
@@ -55,7 +58,7 @@ class Tracker {
   struct InitialPose {
     SE3 T_odom_cam;
     PoseSource source{};
-    bool sure = false;  ///< checked by enough of what it was made from
+    bool sure = false;  ///< as in TrackingResult
   };
   void follow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
@@ -91,6 +94,7 @@ class Tracker {
   StageObserver* observer_;
   Frame previous_;
   Frame current_;
+  bool fixed_ = true;  ///< the last frame, by points or depth
 };
 
 }  // namespace geoflow::slam

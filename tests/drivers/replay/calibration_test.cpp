@@ -117,6 +117,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "unknown key"},
         BadEdit{"depth_factor: 5000", "depth_factor: 0", "chain.yaml:16: depth_factor",
                 "not positive"},
+        BadEdit{"serial: '0123'", "depth_alignment: nearby", "chain.yaml:17: depth_alignment",
+                "nearest_touching"},
         BadEdit{"depth_factor", "depth_scale", "chain.yaml:16: depth_scale", "unknown key"},
         BadEdit{"serial: '0123'", "depth_factor: 1", "chain.yaml:17: depth_factor", "stands twice"},
         BadEdit{"cam0:", "cam2:", "chain.yaml:1", "cam0 is missing"},
@@ -166,6 +168,7 @@ Calibration random_calibration(std::mt19937_64& random) {
       .model = DistortionModel::kRadtan,
       .distortion = {unit(random), unit(random), unit(random), unit(random), unit(random)}};
   calibration.depth_unit_m = 1e-3 * (2 + unit(random));
+  calibration.depth_alignment = DepthAlignment::kNearestTouching;
   calibration.T_cam_imu = pose();
   calibration.T_base_cam = pose();
   calibration.timeshift_cam_imu = from_seconds(0.1 * unit(random));
@@ -189,6 +192,7 @@ void expect_same(const Calibration& a, const Calibration& b) {
   EXPECT_EQ(a.camera.model, b.camera.model);
   EXPECT_EQ(a.camera.distortion, b.camera.distortion);
   EXPECT_DOUBLE_EQ(a.depth_unit_m, b.depth_unit_m);
+  EXPECT_EQ(a.depth_alignment, b.depth_alignment);
   EXPECT_EQ(a.timeshift_cam_imu, b.timeshift_cam_imu);
   EXPECT_EQ(a.serial, b.serial);
   EXPECT_EQ(a.imu_noise.accel_noise_density, b.imu_noise.accel_noise_density);
