@@ -1,12 +1,14 @@
 #include "geoflow/daemon/config.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <ios>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -14,7 +16,8 @@
 #include <variant>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 #include <toml++/toml.h>
 
 #include "geoflow/hal/result.hpp"
@@ -114,7 +117,7 @@ class Reader {
       : keys_{bind_keys(config)}, name_{name}, with_line_{with_line} {}
 
   // NOLINTNEXTLINE(misc-no-recursion): the parser bounds the depth
-  Result<void> read(const toml::table& table, const std::string& prefix) const {
+  [[nodiscard]] Result<void> read(const toml::table& table, const std::string& prefix) const {
     for (const auto& [name, node] : table) {
       const std::string key =
           prefix.empty() ? std::string{name.str()} : fmt::format("{}.{}", prefix, name.str());
@@ -133,13 +136,14 @@ class Reader {
                       : fmt::format("{}: {}", name_, key);
   }
   [[nodiscard]] bool is_section(const std::string& name) const {
-    return std::any_of(keys_.begin(), keys_.end(),
-                       [&](const Key& key) { return key.name.starts_with(name + "."); });
+    return std::ranges::any_of(keys_,
+                               [&](const Key& key) { return key.name.starts_with(name + "."); });
   }
   [[nodiscard]] Result<void> set(const std::string& name, const toml::node& node) const {
     for (const Key& key : keys_) {
       if (key.name == name) {
-        return std::visit(Assign{Given{node, key, place(name, node)}}, key.target);
+        return std::visit(Assign{Given{.node = node, .key = key, .where = place(name, node)}},
+                          key.target);
       }
     }
     if (is_section(name)) {

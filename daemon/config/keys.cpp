@@ -5,7 +5,10 @@
 #include <vector>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/nearest_name.hpp"
+#include "geoflow/slam/config.hpp"
+#include "geoflow/timesync/synchroniser_config.hpp"
 
 // The bounds below are the values for which the code is meant and tested; each is stated with its
 // key in config/geoflow.toml. NOLINTBEGIN(readability-magic-numbers)

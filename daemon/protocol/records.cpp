@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/hal/geometry.hpp"

@@ -8,7 +8,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Error.hpp>
 #include <CLI/Formatter.hpp>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/version.hpp"

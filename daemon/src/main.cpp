@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <variant>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/daemon/daemon.hpp"
 #include "geoflow/hal/exit_code.hpp"

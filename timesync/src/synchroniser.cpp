@@ -1,9 +1,7 @@
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <optional>
-#include <utility>
 
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -68,11 +66,12 @@ void Synchroniser::push_body_velocity(const Arrival<LegClock, BodyVelocitySample
 }
 
 std::optional<SyncedPacket> Synchroniser::pop(HostTime now) {
-  if (color_.buffer.empty() || !is_plausible_stamp_ns(now.time_since_epoch().count())) {
+  const std::optional<HostTime> due = deadline();
+  if (!due || !is_plausible_stamp_ns(now.time_since_epoch().count())) {
     return std::nullopt;
   }
   if (!is_complete(color_.buffer.front().timed.t, now)) {
-    if (now < *deadline()) {
+    if (now < *due) {
       return std::nullopt;
     }
     ++counters_.wait_expired;

@@ -27,6 +27,7 @@ struct SourceConfig {
   bool loop = false;     ///< begin again at its end
 };
 
+// NOLINTBEGIN(readability-magic-numbers): each default is named by its member
 /// The two sockets and what their clients may do.
 struct SocketConfig {
   std::filesystem::path pose = "/run/geoflow/pose.sock";
@@ -45,6 +46,7 @@ struct PipelineConfig {
   int image_queue = 8;      ///< images of each kind that may wait for the synchroniser; likewise
   int sample_queue = 1024;  ///< IMU samples, and leg samples, that may wait for the synchroniser
 };
+// NOLINTEND(readability-magic-numbers)
 
 struct Config {
   SourceConfig source;

@@ -62,13 +62,13 @@ class ClockModel {
   [[nodiscard]] HostStamp to_host(DeviceTime<Clock> t_device) const noexcept {
     const std::int64_t raw_ns = t_device.time_since_epoch().count();
     if (stamps_.domain == StampDomain::kHost) {
-      return {HostTime{Duration{raw_ns}}, Duration::zero()};
+      return {.t = HostTime{Duration{raw_ns}}, .error_bound = Duration::zero()};
     }
     if (!is_plausible_stamp_ns(raw_ns)) {
-      return {HostTime{}, Duration::max()};
+      return {.t = HostTime{}, .error_bound = Duration::max()};
     }
     const Placed placed = fit_.place(unwrapped(raw_ns, fit_.newest_device_ns()));
-    return {HostTime{Duration{placed.t_ns}}, Duration{placed.error_bound_ns}};
+    return {.t = HostTime{Duration{placed.t_ns}}, .error_bound = Duration{placed.error_bound_ns}};
   }
 
   /// True for StampDomain::kHost: stamps are taken as they are.

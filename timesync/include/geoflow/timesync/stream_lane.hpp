@@ -47,7 +47,8 @@ class StreamLane {
   [[nodiscard]] bool is_ready(HostTime t, HostTime now, HostTime listening_since,
                               StreamCounters& counters) {
     const bool alive = liveness_.is_alive(now, listening_since, counters.silences);
-    return !alive || (buffer.newest() && *buffer.newest() >= t);
+    const std::optional<HostTime> newest = buffer.newest();
+    return !alive || (newest && *newest >= t);
   }
 
   /// The samples in (after, until] with the nearest one at or before and the nearest one at or
