@@ -50,8 +50,8 @@ if(GEOFLOW_FUZZ)
   target_compile_options(geoflow_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# What nearly every source includes; precompiled once per part. Sources still include all that they use: the presets clang
-# and tidy build without precompiled headers, and so refuse one that does not.
+# What nearly every source includes; precompiled once per part. Sources still include all that they use: clang-tidy refuses
+# one that does not.
 set(geoflow_precompiled <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <tl/expected.hpp> <algorithm> <chrono> <filesystem>
     <functional> <map> <memory> <optional> <string> <variant> <vector>)
 
