@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
@@ -25,6 +26,7 @@
 #include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
 #include "map/map_correction.hpp"
@@ -92,7 +94,7 @@ class Core::Impl {
       move(builder_.apply(map_, *result.solution));
     }
     if (result.loops) {
-      for (const DepthEdge& loop : loop_closer_.consider(map_, *result.loops)) {
+      for (const RelativeEdge& loop : loop_closer_.consider(map_, *result.loops)) {
         loop_found_ = loop_found_ || moves_map(map_, loop);
         map_.add_edge(loop);
       }
@@ -269,8 +271,10 @@ class Core::Impl {
     if (map_.keyframes().size() > 1) {
       pending_ = reference_;
       if (since_keyframe_) {
-        map_.add_edge({before, reference_, since_keyframe_->T_cam0_cam1,
-                       since_keyframe_->covariance.inverse()});
+        map_.add_edge({.from = before,
+                       .to = reference_,
+                       .T_from_to = since_keyframe_->T_cam0_cam1,
+                       .information = since_keyframe_->covariance.inverse()});
       }
     }
     since_keyframe_.emplace();
@@ -305,11 +309,12 @@ Core::~Core() = default;
 
 Result<std::unique_ptr<Core>> Core::create(const Calibration& calibration, const Config& config,
                                            StageObserver* observer) {
-  return CellGrid::create(calibration.camera, DepthCloudConfig{}.cell_px)
-      .map([&](std::shared_ptr<const CellGrid> grid) {
-        return std::make_unique<Core>(
-            std::make_unique<Impl>(calibration, config, std::move(grid), observer));
-      });
+  auto grid = CellGrid::create(calibration.camera, DepthCloudConfig{}.cell_px);
+  if (!grid) {
+    return tl::unexpected{std::move(grid).error()};
+  }
+  return std::make_unique<Core>(
+      std::make_unique<Impl>(calibration, config, *std::move(grid), observer));
 }
 
 PoseEstimate Core::process(const SyncedPacket& packet) {

@@ -1,7 +1,11 @@
 #include "cloud/cell_grid.hpp"
 
-#include <array>
 #include <cmath>
+#include <cstddef>
+#include <memory>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/result.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -10,8 +14,10 @@ constexpr int kMinCellPx = 2;
 constexpr int kMaxCellPx = 64;
 constexpr int kMaxImagePx = 1 << 14;
 
+using Coefficients = decltype(CameraIntrinsics::distortion);
+
 /// Brown-Conrady, as OpenCV and Kalibr write it: k1 k2 p1 p2 k3.
-Eigen::Vector2d radtan(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
+Eigen::Vector2d radtan(const Coefficients& k, const Eigen::Vector2d& ray) {
   const double x = ray.x();
   const double y = ray.y();
   const double r2 = x * x + y * y;
@@ -21,7 +27,7 @@ Eigen::Vector2d radtan(const std::array<double, 5>& k, const Eigen::Vector2d& ra
 }
 
 /// Kannala-Brandt with four coefficients.
-Eigen::Vector2d equidistant(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
+Eigen::Vector2d equidistant(const Coefficients& k, const Eigen::Vector2d& ray) {
   constexpr double kOnAxis = 1e-9;
   const double r = ray.norm();
   if (r < kOnAxis) {
@@ -90,7 +96,7 @@ Result<std::shared_ptr<const CellGrid>> CellGrid::create(const CameraIntrinsics&
   struct Constructible : CellGrid {
     Constructible(const CameraIntrinsics& intrinsics, int px) : CellGrid{intrinsics, px} {}
   };
-  const auto grid = std::make_shared<Constructible>(camera, cell_px);
+  auto grid = std::make_shared<Constructible>(camera, cell_px);
   for (const Ray& ray : grid->rays_) {
     if (!ray.centre.allFinite() || !ray.per_pixel.allFinite()) {
       return fail(ErrorCode::kInvalidArgument,
@@ -110,7 +116,7 @@ CellGrid::CellGrid(const CameraIntrinsics& camera, int cell_px)
       offset_{static_cast<float>((camera.cx + 0.5) / cell_px),
               static_cast<float>((camera.cy + 0.5) / cell_px)} {
   if (camera.model == DistortionModel::kRadtan) {
-    distorted_ = camera.distortion != std::array<double, 5>{};
+    distorted_ = camera.distortion != Coefficients{};
   }
   rays_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   const double to_middle = 0.5 * (cell_px - 1);

@@ -92,10 +92,19 @@ void add_inverse_depth(const float* __restrict q, std::size_t width, float v,
   }
 }
 
-/// Between each pixel and the other one at the same place of its array.
-void add_steps(const float* __restrict mask, const float* __restrict q,
-               const float* __restrict other_mask, const float* __restrict other_q,
-               std::size_t width, float* __restrict steps, float* __restrict count) {
+/// As convert() writes it.
+struct ConvertedRow {
+  const float* mask;
+  const float* q;
+};
+
+/// Between each pixel and the other one at the same place of its row.
+void add_steps(const ConvertedRow& row, const ConvertedRow& other, std::size_t width,
+               float* __restrict steps, float* __restrict count) {
+  const float* __restrict mask = row.mask;
+  const float* __restrict q = row.q;
+  const float* __restrict other_mask = other.mask;
+  const float* __restrict other_q = other.q;
   for (std::size_t x = 0; x < width; ++x) {
     const float both = mask[x] * other_mask[x];
     steps[x] += both * std::abs(other_q[x] - q[x]);
@@ -208,11 +217,12 @@ void DepthCloud::accumulate_row_of_cells(const FrameRef& depth, int cell_row) {
     add_mask(mask, width, v, count, sum_v, sum_vv);
     add_inverse_depth(q, width, v, sum_q, sum_qv, sum_qq);
     if (pixels_.alignment == DepthAlignment::kNearestTouching) {
-      add_steps(mask, q, mask + 1, q + 1, width - 1, columns_.data() + kStepsAlong * width,
-                columns_.data() + kCountAlong * width);
+      const ConvertedRow row{.mask = mask, .q = q};
+      add_steps(row, {.mask = mask + 1, .q = q + 1}, width - 1,
+                columns_.data() + kStepsAlong * width, columns_.data() + kCountAlong * width);
       if (i > 0) {
-        add_steps(mask, q, mask_above, q_above, width, columns_.data() + kStepsDown * width,
-                  columns_.data() + kCountDown * width);
+        add_steps(row, {.mask = mask_above, .q = q_above}, width,
+                  columns_.data() + kStepsDown * width, columns_.data() + kCountDown * width);
       }
       std::swap(mask, mask_above);
       std::swap(q, q_above);

@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
 
 /// What a cell's neighbours say of it: DepthCloud's noise and normals.
@@ -99,8 +98,8 @@ void DepthCloud::drop_edges() {
 /// they say little of their common error. Three cells in a row with one left out between them do,
 /// whose inverse depths lie on a line where they are of one plane.
 void DepthCloud::measure_noise() {
-  constexpr float kNormalQuartile = 0.6745F;  // median of |x| of a Gaussian
-  const float kSecondDifference = std::sqrt(6.0F);
+  constexpr float kNormalQuartile = 0.6745F;        // median of |x| of a Gaussian
+  const float second_difference = std::sqrt(6.0F);  // per sigma: 1, -2, 1
   scratch_.clear();
   const auto columns = static_cast<std::size_t>(grid_->columns());
   const auto inverse_depth = [this](std::size_t cell) { return 1.0F / surfels_[cell].point.z(); };
@@ -120,7 +119,7 @@ void DepthCloud::measure_noise() {
   }
   sigma_ = static_cast<float>(config_.least_sigma);
   if (!scratch_.empty()) {
-    sigma_ = std::max(sigma_, median(scratch_) / (kNormalQuartile * kSecondDifference));
+    sigma_ = std::max(sigma_, median(scratch_) / (kNormalQuartile * second_difference));
   }
   const auto least = static_cast<float>(config_.least_sigma * config_.least_sigma);
   const float independent =
@@ -169,16 +168,19 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   const int column = static_cast<int>(cell) % columns;
   const int row = static_cast<int>(cell) / columns;
   PlaneFit plane;
+  const auto add_if_it_continues = [&](int index, bool added) {
+    const Eigen::Vector3f& other = rays_[static_cast<std::size_t>(index)];
+    const Eigen::Vector2f ray = other.head<2>() - ray0;
+    const float q = other.z() - q0;
+    if (!added && other.z() > 0 && std::abs(q - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
+      plane.add(ray, q);
+    }
+  };
   for (int ring = 1; ring <= kRings && best.w() > enough; ++ring) {
     for (int r = std::max(row - ring, 0); r <= std::min(row + ring, grid_->rows() - 1); ++r) {
       for (int c = std::max(column - ring, 0); c <= std::min(column + ring, columns - 1); ++c) {
         const bool added = ring > 1 && std::max(std::abs(r - row), std::abs(c - column)) < ring;
-        const Eigen::Vector3f& other = rays_[static_cast<std::size_t>(r * columns + c)];
-        const Eigen::Vector2f ray = other.head<2>() - ray0;
-        const float q = other.z() - q0;
-        if (!added && other.z() > 0 && std::abs(q - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
-          plane.add(ray, q);
-        }
+        add_if_it_continues(r * columns + c, added);
       }
     }
     PlaneFit fitted = plane;

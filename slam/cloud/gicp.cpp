@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/depth_cloud.hpp"
 #include "cloud/gicp_internal.hpp"
 
 namespace geoflow::slam {

@@ -1,11 +1,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
+#include "geoflow/hal/geometry.hpp"
+
+#include "cloud/cell_grid.hpp"
+#include "cloud/depth_cloud.hpp"
+#include "cloud/gicp.hpp"
 #include "cloud/gicp_internal.hpp"
 
 namespace geoflow::slam {
@@ -65,9 +73,9 @@ struct Problem {
 
 /// The surfel of `cell` if it may be paired with the source surfel at `point` with `normal` (in the
 /// target's frame).
-const Surfel* acceptable(const Problem& problem, std::size_t cell, const Eigen::Vector3f& point,
+const Surfel* acceptable(const Problem& problem, int cell, const Eigen::Vector3f& point,
                          const Eigen::Vector3f& normal, float& distance2) {
-  const Surfel& candidate = problem.target[cell];
+  const Surfel& candidate = problem.target[static_cast<std::size_t>(cell)];
   if (!candidate.valid() || candidate.normal.dot(normal) < problem.min_cosine) {
     return nullptr;
   }
@@ -90,7 +98,7 @@ const Surfel* associate(const Problem& problem, const Eigen::Vector3f& point,
   const int columns = problem.grid.columns();
   const Surfel* best = nullptr;
   float distance2 = problem.max_distance2;
-  const auto middle = static_cast<std::size_t>(cell->y() * columns + cell->x());
+  const int middle = cell->y() * columns + cell->x();
   if (const Surfel* const hit = acceptable(problem, middle, point, normal, distance2)) {
     return hit;
   }
@@ -100,7 +108,7 @@ const Surfel* associate(const Problem& problem, const Eigen::Vector3f& point,
   const int last_column = std::min(cell->x() + problem.search, columns - 1);
   for (int row = first_row; row <= last_row; ++row) {
     for (int column = first_column; column <= last_column; ++column) {
-      const auto index = static_cast<std::size_t>(row * columns + column);
+      const int index = row * columns + column;
       if (const Surfel* const candidate = acceptable(problem, index, point, normal, distance2)) {
         best = candidate;
       }

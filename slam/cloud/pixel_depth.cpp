@@ -18,6 +18,7 @@ namespace {
 
 /// The median [counts] of the 3 x 3 neighbourhood of a raw pixel; 0: none.
 double median_depth(const FrameRef& depth, const Eigen::Vector2d& raw) {
+  constexpr std::size_t kSide = 3;
   constexpr std::size_t kEnough = 5;
   constexpr double kDiscontinuity = 0.05;
   if (!depth) {
@@ -26,7 +27,7 @@ double median_depth(const FrameRef& depth, const Eigen::Vector2d& raw) {
   const ImageShape& shape = depth.shape();
   const int column = static_cast<int>(std::lround(raw.x()));
   const int row = static_cast<int>(std::lround(raw.y()));
-  std::array<std::uint16_t, 9> values{};
+  std::array<std::uint16_t, kSide * kSide> values{};
   std::size_t count = 0;
   for (int y = std::max(0, row - 1); y <= std::min(shape.height - 1, row + 1); ++y) {
     for (int x = std::max(0, column - 1); x <= std::min(shape.width - 1, column + 1); ++x) {
@@ -54,7 +55,8 @@ double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vec
   if (measured == 0 || cell.x() >= grid.columns() || cell.y() >= grid.rows()) {
     return measured;
   }
-  const auto index = static_cast<std::size_t>(cell.y() * grid.columns() + cell.x());
+  const int in_row_order = cell.y() * grid.columns() + cell.x();
+  const auto index = static_cast<std::size_t>(in_row_order);
   const Surfel& surfel = cloud.surfels()[index];
   if (!surfel.valid()) {
     return 0;

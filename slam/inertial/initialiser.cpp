@@ -177,7 +177,7 @@ void StandingInitialiser::add(HostTime t, const ImuSample& sample) {
 }
 
 void StandingInitialiser::close_block() {
-  const double n = static_cast<double>(open_.samples);
+  const auto n = static_cast<double>(open_.samples);
   open_.sum /= n;
   const Vector6d variance = open_.sum_of_squares / n - open_.sum.cwiseAbs2();
   const bool shaking = variance.head<3>().maxCoeff() > kGyroShaking * kGyroShaking ||

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <numbers>
 #include <ratio>
 #include <span>
 #include <vector>
@@ -70,7 +71,7 @@ InertialSample interpolate(const InertialSample& a, const InertialSample& b, Hos
 /// Variance of a step's mean that comes from the signal between the samples, per axis.
 Vector3d unseen_variance(const Vector3d& change, double noise_sigma, double wander,
                          const Step& step, double period_s) {
-  const double least = kNoiseSigmas * std::sqrt(2.0) * noise_sigma;
+  const double least = kNoiseSigmas * std::numbers::sqrt2 * noise_sigma;
   Vector3d variance = kBridge * (change.cwiseAbs().array() - least).cwiseMax(0).square().matrix();
   if (step.held || step.gap_s > kGapPeriods * period_s) {
     const double share = (step.held ? kOneEnd : kBridge) * step.gap_s;
@@ -231,10 +232,9 @@ std::vector<Step> steps_over(std::span<const InertialSample> samples, HostTime t
 std::vector<InertialSample> unscreened(std::span<const Timed<ImuSample>> samples) {
   std::vector<InertialSample> result;
   result.reserve(samples.size());
-  std::transform(samples.begin(), samples.end(), std::back_inserter(result),
-                 [](const Timed<ImuSample>& timed) {
-                   return InertialSample{.t = timed.t, .sample = timed.sample};
-                 });
+  std::ranges::transform(samples, std::back_inserter(result), [](const Timed<ImuSample>& timed) {
+    return InertialSample{.t = timed.t, .sample = timed.sample};
+  });
   return result;
 }
 

@@ -14,7 +14,6 @@
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/leg_kinematics.hpp"
-#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
@@ -189,10 +188,11 @@ std::array<std::optional<FootEvidence>, kLegCount> LegOdometry::evidence(const L
   }
   std::array<std::optional<FootEvidence>, kLegCount> evidence;
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-    if (!motions.at(leg)) {
+    const std::optional<FootMotion>& found = motions.at(leg);
+    if (!found) {
       continue;
     }
-    const FootMotion& motion = motions.at(leg).value();
+    const FootMotion& motion = *found;
     FootEvidence& foot = evidence.at(leg).emplace();
     foot.force = static_cast<double>(legs.foot_force.at(leg));
     foot.height_m = turn.up_base.dot(motion.contact.point) - lowest;
@@ -231,9 +231,8 @@ void LegOdometry::take(const Timed<LegSample>& legs) {
   use_stance(found, turn, dt);
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
     double drag = 0;
-    if (seen.at(leg)) {
-      drag = std::max(
-          0.0, seen.at(leg)->v_odom_mps.norm() - std::sqrt(seen.at(leg)->v_covariance.trace()));
+    if (const std::optional<FootEvidence>& foot = seen.at(leg)) {
+      drag = std::max(0.0, foot->v_odom_mps.norm() - std::sqrt(foot->v_covariance.trace()));
     }
     const double dragged = drag * drag * kDragMemory;
     step_noise_.foothold.at(leg) =

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <chrono>
-#include <deque>
 #include <optional>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -63,7 +63,7 @@ void LegOdometry::start(const StandingFix& fix) {
 void LegOdometry::try_start(HostTime t) {
   if (const Result<StandingFix> fix = initialiser_.fix()) {
     start(*fix);
-  } else if (!imu_.empty() && t - *t_first_ >= kPatience) {
+  } else if (!imu_.empty() && t_first_ && t - *t_first_ >= kPatience) {
     Vector3d sum = Vector3d::Zero();
     const HostTime t_end = std::min(t, imu_.newest());
     for (HostTime s = t_end - kPatience / 2; s < t_end; s = imu_.next_knot(s, t_end)) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <deque>
 #include <optional>
 
 #include "geoflow/hal/geometry.hpp"

@@ -8,6 +8,8 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "map/ids.hpp"
+
 namespace geoflow::slam {
 
 KeyframeId Map::add_keyframe(Keyframe keyframe) {
@@ -28,7 +30,7 @@ void Map::describe(KeyframeId id, std::shared_ptr<const PlaceView> place) {
 }
 
 void Map::remove_edges(KeyframeId from, KeyframeId to) {
-  std::erase_if(edges_, [&](const DepthEdge& e) { return e.from == from && e.to == to; });
+  std::erase_if(edges_, [&](const RelativeEdge& e) { return e.from == from && e.to == to; });
 }
 
 PointId Map::add_point(MapPoint point) {

@@ -39,7 +39,7 @@ struct MapPoint {
 
 /// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); from
 /// IMU and legs in between; or from both views, where a loop closes.
-struct DepthEdge {
+struct RelativeEdge {
   KeyframeId from;
   KeyframeId to;
   SE3 T_from_to;
@@ -57,8 +57,8 @@ struct Keyframe {
   std::vector<PointId> points;                  ///< that it observes
 };
 
-/// Keyframes, points and depth edges. Iterates in order of id, so that the same input gives the
-/// same map.
+/// Keyframes, points and the edges between keyframes. Iterates in order of id, so that the same
+/// input gives the same map.
 class Map {
  public:
   KeyframeId add_keyframe(Keyframe keyframe);
@@ -67,7 +67,7 @@ class Map {
   PointId add_point(MapPoint point);
   /// Records that a keyframe sees a point (once per pair).
   void observe(PointId point, const Observation& observation);
-  void add_edge(const DepthEdge& edge) { edges_.push_back(edge); }
+  void add_edge(const RelativeEdge& edge) { edges_.push_back(edge); }
   /// Forgets all edges between two keyframes, in this direction.
   void remove_edges(KeyframeId from, KeyframeId to);
   /// Forgets a point and all its observations.
@@ -85,7 +85,7 @@ class Map {
     return keyframes_;
   }
   [[nodiscard]] const std::map<PointId, MapPoint>& points() const noexcept { return points_; }
-  [[nodiscard]] const std::vector<DepthEdge>& edges() const noexcept { return edges_; }
+  [[nodiscard]] const std::vector<RelativeEdge>& edges() const noexcept { return edges_; }
   /// By what they look like: the keyframes that have their place.
   [[nodiscard]] const PlaceIndex& places() const noexcept { return places_; }
   [[nodiscard]] Keyframe& keyframe(KeyframeId id) { return keyframes_.at(id); }
@@ -97,7 +97,7 @@ class Map {
  private:
   std::map<KeyframeId, Keyframe> keyframes_;
   std::map<PointId, MapPoint> points_;
-  std::vector<DepthEdge> edges_;
+  std::vector<RelativeEdge> edges_;
   PlaceIndex places_;
   std::uint32_t next_keyframe_ = 0;
   std::uint32_t next_point_ = 0;

@@ -22,6 +22,7 @@
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/gicp.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
 #include "map/overlap.hpp"
@@ -211,7 +212,7 @@ std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<K
       }
     }
   }
-  for (const DepthEdge& edge : map.edges()) {
+  for (const RelativeEdge& edge : map.edges()) {
     connect(edge.from, edge.to);
   }
   for (const auto& [from, to] : problem.edges_to_measure) {
@@ -269,9 +270,9 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
     }
   }
   std::copy_if(map.edges().begin(), map.edges().end(), std::back_inserter(problem->edges),
-               [&](const DepthEdge& e) { return inside(e.from) && inside(e.to); });
+               [&](const RelativeEdge& e) { return inside(e.from) && inside(e.to); });
   std::erase_if(problem->edges_to_measure, [&](const auto& pair) { return !inside(pair.first); });
-  return {problem};
+  return {.problem = problem};
 }
 
 SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
@@ -294,7 +295,7 @@ SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
   for (const auto& [point, keyframe] : solution.outliers) {
     map.remove_observation(point, keyframe);
   }
-  for (const DepthEdge& edge : solution.measured) {
+  for (const RelativeEdge& edge : solution.measured) {
     map.add_edge(edge);
   }
   return T_odom1_odom0;

@@ -8,6 +8,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "optimisation/pose_graph.hpp"
 
@@ -34,7 +35,7 @@ Matrix6d information_of_step(const SE3& T_from_to) {
 
 }  // namespace
 
-bool moves_map(const Map& map, const DepthEdge& loop) {
+bool moves_map(const Map& map, const RelativeEdge& loop) {
   constexpr double kChi2Of6At95Percent = 12.59;
   const SE3& T_odom_from = map.keyframe(loop.from).T_odom_cam;
   const SE3& T_odom_to = map.keyframe(loop.to).T_odom_cam;
@@ -55,7 +56,7 @@ PoseGraphProblem pose_graph(const Map& map) {
       problem.way.push_back({it->first, next->first, T_from_to, information_of_step(T_from_to)});
     }
   }
-  for (const DepthEdge& edge : map.edges()) {
+  for (const RelativeEdge& edge : map.edges()) {
     if (ids_apart(edge.from, edge.to) > kLoop) {
       problem.loops.push_back(edge);
     }
@@ -72,7 +73,7 @@ std::optional<SE3> correct(Map& map, const PoseGraphSolution& solution) {
   }
   // T_odom1_odom0 of each keyframe.
   const auto& [newest, pose] = *solution.T_odom_cam.rbegin();
-  const SE3 newest_motion = pose * map.keyframe(newest).T_odom_cam.inverse();
+  SE3 newest_motion = pose * map.keyframe(newest).T_odom_cam.inverse();
   std::map<KeyframeId, SE3> motion;
   for (const auto& [id, keyframe] : map.keyframes()) {
     const auto solved = solution.T_odom_cam.find(id);

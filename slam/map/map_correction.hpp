@@ -12,7 +12,7 @@ namespace geoflow::slam {
 
 /// Whether a loop moves its new keyframe by more than the loop's own uncertainty (chi-square at
 /// 95 %), so that closing it is worth while.
-[[nodiscard]] bool moves_map(const Map& map, const DepthEdge& loop);
+[[nodiscard]] bool moves_map(const Map& map, const RelativeEdge& loop);
 
 /// All keyframes; between consecutive ones their present relative pose, as uncertain as odometry
 /// leaves it; and the edges between keyframes that are far apart in time.

@@ -34,7 +34,7 @@ struct MappingPoint {
 struct MappingProblem {
   std::vector<MappingKeyframe> keyframes;  ///< in order of id; at least one is fixed
   std::vector<MappingPoint> points;
-  std::vector<DepthEdge> edges;  ///< known ones between keyframes of the problem
+  std::vector<RelativeEdge> edges;  ///< known ones between keyframes of the problem
   std::vector<std::pair<KeyframeId, KeyframeId>>
       edges_to_measure;  ///< pairs whose depth is to be registered first
   CameraIntrinsics camera;
@@ -47,7 +47,7 @@ struct MappingSolution {
   std::map<KeyframeId, SE3> T_odom_cam;                  ///< of the keyframes that moved
   std::map<PointId, Vector3d> p_odom;                    ///< of the points that moved
   std::vector<std::pair<PointId, KeyframeId>> outliers;  ///< observations that contradict the rest
-  std::vector<DepthEdge> measured;                       ///< registrations that succeeded
+  std::vector<RelativeEdge> measured;                    ///< registrations that succeeded
 };
 
 }  // namespace geoflow::slam

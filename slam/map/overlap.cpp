@@ -11,6 +11,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/depth_cloud.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 
 namespace geoflow::slam {

@@ -9,6 +9,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"

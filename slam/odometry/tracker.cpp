@@ -22,6 +22,7 @@
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
 #include "cloud/gicp_search.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"
@@ -68,9 +69,11 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
   }
   const StageScope scope{observer_, Stage::kCloud};
   if (packet.depth) {
-    auto cloud = std::make_shared<DepthCloud>(
-        grid_, DepthCloud::Pixels{calibration_.depth_unit_m, calibration_.depth_alignment},
-        DepthCloudConfig{});
+    auto cloud =
+        std::make_shared<DepthCloud>(grid_,
+                                     DepthCloud::Pixels{.unit_m = calibration_.depth_unit_m,
+                                                        .alignment = calibration_.depth_alignment},
+                                     DepthCloudConfig{});
     if (cloud->build(packet.depth)) {
       current_.cloud = std::move(cloud);
       current_.depth = packet.depth;
@@ -118,7 +121,10 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
       continue;
     }
     const MapPoint* point = map.find_point(*feature.point);
-    const Vector3d p_cam = point == nullptr ? Vector3d::Zero() : T_cam_odom * point->p_odom;
+    if (point == nullptr) {
+      continue;
+    }
+    const Vector3d p_cam = T_cam_odom * point->p_odom;
     if (p_cam.z() > 0) {
       points.push_back(*feature.point);
       expected.push_back({camera_.distort(camera_.project(p_cam)), point->descriptor});

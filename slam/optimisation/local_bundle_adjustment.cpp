@@ -7,14 +7,17 @@
 #include <vector>
 
 #include <ceres/loss_function.h>
+#include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
+#include <ceres/types.h>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/mapping.hpp"
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/gicp.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
 #include "optimisation/factors.hpp"
@@ -27,7 +30,8 @@ namespace {
 
 constexpr double kCauchyWidth =
     2.0;  ///< of reprojection and depth residuals, in standard deviations
-constexpr double kHuberWidth = 2.5;  ///< of depth edges, in standard deviations of six dimensions
+constexpr double kHuberWidth =
+    2.5;  ///< of relative edges, in standard deviations of six dimensions
 
 class LocalBundleAdjustment {
  public:
@@ -51,9 +55,11 @@ class LocalBundleAdjustment {
   }
 
  private:
-  const MappingKeyframe& keyframe(KeyframeId id) const { return problem_.keyframes[index_.at(id)]; }
+  [[nodiscard]] const MappingKeyframe& keyframe(KeyframeId id) const {
+    return problem_.keyframes[index_.at(id)];
+  }
   PoseBlock& pose(KeyframeId id) { return poses_[index_.at(id)]; }
-  const PoseBlock& pose(KeyframeId id) const { return poses_[index_.at(id)]; }
+  [[nodiscard]] const PoseBlock& pose(KeyframeId id) const { return poses_[index_.at(id)]; }
 
   void measure_edges() {
     for (const auto& [from, to] : problem_.edges_to_measure) {
@@ -67,7 +73,7 @@ class LocalBundleAdjustment {
     }
   }
 
-  Vector2d residual(const Observation& observation, const Vector3d& p_odom) const {
+  [[nodiscard]] Vector2d residual(const Observation& observation, const Vector3d& p_odom) const {
     const Vector3d p_cam = from_block(pose(observation.keyframe).data()).inverse() * p_odom;
     return camera_.project(p_cam) - observation.pixel;
   }
@@ -131,12 +137,12 @@ class LocalBundleAdjustment {
   }
 
   void add_edges() {
-    const auto add = [&](const DepthEdge& edge) {
+    const auto add = [&](const RelativeEdge& edge) {
       add_factor<RelativePoseFactor>(&edge_loss_, {pose(edge.from).data(), pose(edge.to).data()},
                                      edge.T_from_to, edge.information);
     };
-    std::for_each(problem_.edges.begin(), problem_.edges.end(), add);
-    std::for_each(solution_->measured.begin(), solution_->measured.end(), add);
+    std::ranges::for_each(problem_.edges, add);
+    std::ranges::for_each(solution_->measured, add);
   }
 
   void run() {

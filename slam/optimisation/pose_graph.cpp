@@ -13,6 +13,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "optimisation/factors.hpp"
 
@@ -23,7 +24,7 @@ constexpr double kCauchyWidth = 4.1;    ///< of six standard normals' norm, 99 %
 constexpr double kContradicts = 22.46;  ///< chi-square of six degrees of freedom at 99.9 %
 constexpr int kIterations = 50;
 
-double chi_square(const DepthEdge& edge, const SE3& T_odom_from, const SE3& T_odom_to) {
+double chi_square(const RelativeEdge& edge, const SE3& T_odom_from, const SE3& T_odom_to) {
   const SE3& T_from_to = edge.T_from_to;
   const Vector6d error = (T_from_to.inverse() * (T_odom_from.inverse() * T_odom_to)).log();
   return error.dot(edge.information * error);
@@ -49,15 +50,15 @@ PoseGraphSolution solve_pose_graph(const PoseGraphProblem& problem) {
     poses.push_back(to_block(node.T_odom_cam));
     ceres.AddParameterBlock(poses.back().data(), kPoseSize, &manifold);
   }
-  const auto add = [&](const DepthEdge& edge, ceres::LossFunction* loss) {
+  const auto add = [&](const RelativeEdge& edge, ceres::LossFunction* loss) {
     factors.push_back(std::make_unique<RelativePoseFactor>(edge.T_from_to, edge.information));
     ceres.AddResidualBlock(factors.back().get(), loss, poses[index.at(edge.from)].data(),
                            poses[index.at(edge.to)].data());
   };
-  for (const DepthEdge& edge : problem.way) {
+  for (const RelativeEdge& edge : problem.way) {
     add(edge, nullptr);
   }
-  for (const DepthEdge& edge : problem.loops) {
+  for (const RelativeEdge& edge : problem.loops) {
     add(edge, &loop_loss);
   }
   PoseGraphSolution solution;
@@ -78,7 +79,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraphProblem& problem) {
   for (const PoseGraphNode& node : problem.nodes) {
     solution.T_odom_cam.emplace(node.id, from_block(poses[index.at(node.id)].data()));
   }
-  for (const DepthEdge& edge : problem.loops) {
+  for (const RelativeEdge& edge : problem.loops) {
     if (chi_square(edge, solution.T_odom_cam.at(edge.from), solution.T_odom_cam.at(edge.to)) >
         kContradicts) {
       solution.contradicted.emplace_back(edge.from, edge.to);

@@ -11,15 +11,15 @@
 namespace geoflow::slam {
 
 struct PoseGraphNode {
-  KeyframeId id;
+  KeyframeId id{};
   SE3 T_odom_cam;
 };
 
 /// Keyframes and what is known of their relative poses.
 struct PoseGraphProblem {
   std::vector<PoseGraphNode> nodes;  ///< in order of id; the first is held
-  std::vector<DepthEdge> way;        ///< between consecutive ones
-  std::vector<DepthEdge> loops;      ///< between others; may be wrong
+  std::vector<RelativeEdge> way;     ///< between consecutive ones
+  std::vector<RelativeEdge> loops;   ///< between others; may be wrong
 };
 
 struct PoseGraphSolution {

@@ -17,9 +17,11 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/gicp.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "place/loop_problem.hpp"
 #include "place/place_index.hpp"
 #include "vision/camera_model.hpp"
 #include "vision/orb_features.hpp"
@@ -94,7 +96,8 @@ class Verifier {
     if (depth) {
       targets.push_back({old.cloud.get(), SE3{}});
     }
-    PosePrior prior{T_old_new, Matrix6d::Identity()};  // a radian, a metre: nothing
+    // A radian, a metre: nothing.
+    const PosePrior prior{.T_odom_cam = T_old_new, .information = Matrix6d::Identity()};
     const PoseSolution solution = optimiser_.solve({.matches = matches,
                                                     .cloud = problem_.newest.cloud.get(),
                                                     .targets = targets,
@@ -113,7 +116,10 @@ class Verifier {
       return std::nullopt;
     }
     return LoopHypothesis{
-        .edge = {old.id, problem_.newest.id, T_old_new1, solution.covariance.inverse()},
+        .edge = {.from = old.id,
+                 .to = problem_.newest.id,
+                 .T_from_to = T_old_new1,
+                 .information = solution.covariance.inverse()},
         .certain = depth && solution.visual_inliers >= kInliersBeyondDoubt &&
                    agrees(old, T_old_new1, kSeenBeyondDoubt, kAgreeingBeyondDoubt)};
   }
@@ -122,8 +128,9 @@ class Verifier {
   [[nodiscard]] VisualMatch match(const LoopView& old, std::size_t in_new,
                                   std::size_t in_old) const {
     const PlaceView& seen = *problem_.newest.place;
-    return {old.place->p_cam[in_old], camera_.undistort(seen.features[in_new].pixel),
-            seen.p_cam[in_new].z()};
+    return {.p_odom = old.place->p_cam[in_old],
+            .pixel = camera_.undistort(seen.features[in_new].pixel),
+            .depth_m = seen.p_cam[in_new].z()};
   }
 
   [[nodiscard]] std::vector<VisualMatch> pairs(const LoopView& old) const {
@@ -205,7 +212,7 @@ std::set<KeyframeId> linked(const Map& map, KeyframeId newest) {
       found.insert(id);
     }
   }
-  for (const DepthEdge& edge : map.edges()) {
+  for (const RelativeEdge& edge : map.edges()) {
     if (tied(edge.from) || tied(edge.to)) {
       found.insert(edge.from);
       found.insert(edge.to);
@@ -216,7 +223,7 @@ std::set<KeyframeId> linked(const Map& map, KeyframeId newest) {
 
 LoopView view_of(const Map& map, KeyframeId id) {
   const Keyframe& keyframe = map.keyframe(id);
-  return {id, keyframe.place, keyframe.cloud};
+  return {.id = id, .place = keyframe.place, .cloud = keyframe.cloud};
 }
 
 /// Length of the way between two keyframes [m].
@@ -230,13 +237,13 @@ double way_between(const Map& map, KeyframeId from, KeyframeId to) {
 }
 
 /// What a loop says of where its new keyframe is.
-SE3 pose_by(const Map& map, const DepthEdge& loop) {
+SE3 pose_by(const Map& map, const RelativeEdge& loop) {
   const SE3& T_odom_from = map.keyframe(loop.from).T_odom_cam;
   const SE3& T_from_to = loop.T_from_to;
   return T_odom_from * T_from_to;
 }
 
-bool is_possible(const Map& map, const DepthEdge& loop) {
+bool is_possible(const Map& map, const RelativeEdge& loop) {
   const double way_m = way_between(map, loop.from, loop.to);
   const SE3& T_odom_new = map.keyframe(loop.to).T_odom_cam;
   const SE3 T_odom_new1 = pose_by(map, loop);
@@ -246,7 +253,7 @@ bool is_possible(const Map& map, const DepthEdge& loop) {
 }
 
 /// Whether two loops put the later's new keyframe at one place, by the way between them.
-bool say_the_same(const Map& map, const DepthEdge& a, const DepthEdge& b) {
+bool say_the_same(const Map& map, const RelativeEdge& a, const RelativeEdge& b) {
   const SE3& T_odom_newa = map.keyframe(a.to).T_odom_cam;
   const SE3& T_odom_newb = map.keyframe(b.to).T_odom_cam;
   const SE3 T_odom_newb1 = pose_by(map, a) * (T_odom_newa.inverse() * T_odom_newb);
@@ -289,9 +296,8 @@ std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeI
   }
   const std::set<KeyframeId> links = linked(map, newest);
   std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
-    return std::any_of(links.begin(), links.end(), [&](KeyframeId id) {
-      return ids_apart(id, candidate.keyframe) <= kNeighbours;
-    });
+    return std::ranges::any_of(
+        links, [&](KeyframeId id) { return ids_apart(id, candidate.keyframe) <= kNeighbours; });
   });
   auto problem = std::make_shared<LoopProblem>();
   for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
@@ -304,8 +310,8 @@ std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeI
   return problem->candidates.empty() ? nullptr : problem;
 }
 
-std::vector<DepthEdge> LoopCloser::consider(const Map& map, const LoopSolution& solution) {
-  std::vector<DepthEdge> believed;
+std::vector<RelativeEdge> LoopCloser::consider(const Map& map, const LoopSolution& solution) {
+  std::vector<RelativeEdge> believed;
   for (const LoopHypothesis& found : solution.found) {
     if (!is_possible(map, found.edge)) {
       continue;
@@ -313,7 +319,7 @@ std::vector<DepthEdge> LoopCloser::consider(const Map& map, const LoopSolution& 
     std::erase_if(waiting_, [&](const LoopHypothesis& other) {
       return ids_apart(other.edge.to, found.edge.to) > kAmongLast;
     });
-    std::map<KeyframeId, DepthEdge> agreeing{{found.edge.to, found.edge}};
+    std::map<KeyframeId, RelativeEdge> agreeing{{found.edge.to, found.edge}};
     for (const LoopHypothesis& other : waiting_) {
       if (say_the_same(map, other.edge, found.edge)) {
         agreeing.emplace(other.edge.to, other.edge);
@@ -321,8 +327,9 @@ std::vector<DepthEdge> LoopCloser::consider(const Map& map, const LoopSolution& 
     }
     waiting_.push_back(found);
     if (believed.empty() && (found.certain || agreeing.size() >= kAgree)) {
-      std::transform(agreeing.begin(), agreeing.end(), std::back_inserter(believed),
-                     [](const auto& keyframe_and_edge) { return keyframe_and_edge.second; });
+      std::ranges::transform(
+          agreeing, std::back_inserter(believed),
+          [](const auto& keyframe_and_edge) { return keyframe_and_edge.second; });
     }
   }
   if (!believed.empty()) {

@@ -35,7 +35,7 @@ class LoopCloser {
 
   /// Takes in what verify_loops() found, in order of keyframes, and returns the loops that are now
   /// to be closed. Keyframes' poses are those of the map at this time.
-  [[nodiscard]] std::vector<DepthEdge> consider(const Map& map, const LoopSolution& solution);
+  [[nodiscard]] std::vector<RelativeEdge> consider(const Map& map, const LoopSolution& solution);
 
  private:
   Config config_;

@@ -34,7 +34,7 @@ struct LoopProblem {
 
 /// Two views of one place, so far as they themselves can tell.
 struct LoopHypothesis {
-  DepthEdge edge;        ///< from the old keyframe to the new one
+  RelativeEdge edge;     ///< from the old keyframe to the new one
   bool certain = false;  ///< needs no others that say the same
 };
 

@@ -10,6 +10,7 @@
 
 #include "cloud/gicp.hpp"
 #include "cloud/gicp_search.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"
@@ -98,7 +99,7 @@ Relocaliser::Hypothesis Relocaliser::refined(const Frame& frame, const Keyframe&
   constexpr double kFarM = 0.2;
   constexpr double kFarRad = 0.15;
   if (!frame.cloud || !keyframe.cloud) {
-    return {T_odom_cam, false};
+    return {.T_odom_cam = T_odom_cam, .certain = false};
   }
   const SE3& T_odom_keyframe = keyframe.T_odom_cam;
   const SE3 T_keyframe_cam = T_odom_keyframe.inverse() * T_odom_cam;
@@ -109,9 +110,10 @@ Relocaliser::Hypothesis Relocaliser::refined(const Frame& frame, const Keyframe&
   // Whether the last steps were small enough does not matter here: the depth's agreement is looked
   // at.
   if (found.inliers == 0 || moved.head<3>().norm() > kFarRad || moved.tail<3>().norm() > kFarM) {
-    return {T_odom_cam, false};
+    return {.T_odom_cam = T_odom_cam, .certain = false};
   }
-  return {T_odom_cam * SE3::exp(moved), depth_confirms(frame, keyframe, found)};
+  return {.T_odom_cam = T_odom_cam * SE3::exp(moved),
+          .certain = depth_confirms(frame, keyframe, found)};
 }
 
 bool Relocaliser::depth_confirms(const Frame& frame, const Keyframe& keyframe,
@@ -141,8 +143,8 @@ std::vector<FlowSeed> Relocaliser::seeds(const Map& map, KeyframeId id,
   std::vector<FlowSeed> seeds;
   for (const PointId point_id : map.keyframe(id).points) {
     const MapPoint& point = *map.find_point(point_id);
-    const auto observation = std::find_if(point.observations.begin(), point.observations.end(),
-                                          [&](const Observation& o) { return o.keyframe == id; });
+    const auto observation = std::ranges::find_if(
+        point.observations, [&](const Observation& o) { return o.keyframe == id; });
     FlowSeed seed{.previous = camera_.distort(observation->pixel), .predicted = std::nullopt};
     const Vector3d p_cam = T_cam_odom * point.p_odom;
     if (p_cam.z() > 0) {
@@ -164,8 +166,8 @@ std::vector<std::optional<Vector2d>> Relocaliser::find_points(const Map& map, co
   std::vector<ExpectedFeature> expected;
   std::vector<std::size_t> point_of;
   for (std::size_t i = 0; i < sought.size(); ++i) {
-    if (sought[i].predicted) {
-      expected.push_back({*sought[i].predicted, map.find_point(keyframe.points[i])->descriptor});
+    if (const std::optional<Vector2d>& predicted = sought[i].predicted) {
+      expected.push_back({*predicted, map.find_point(keyframe.points[i])->descriptor});
       point_of.push_back(i);
     }
   }
@@ -188,12 +190,11 @@ std::optional<Relocation> Relocaliser::confirmed(const Map& map, const Frame& fr
   const auto tracks = find_points(map, frame, id, hypothesis.T_odom_cam);
   std::vector<VisualMatch> matches;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (tracks[i]) {
-      matches.push_back(
-          {map.find_point(keyframe.points[i])->p_odom, camera_.undistort(*tracks[i]), 0});
+    if (const std::optional<Vector2d>& track = tracks[i]) {
+      matches.push_back({map.find_point(keyframe.points[i])->p_odom, camera_.undistort(*track), 0});
     }
   }
-  Relocation found{id, hypothesis.T_odom_cam, {}};
+  Relocation found{.keyframe = id, .T_odom_cam = hypothesis.T_odom_cam, .tracks = {}};
   if (const auto solution = solve_pnp(matches, camera_, config_.pose, kConfirmation)) {
     found.T_odom_cam = solution->T_odom_cam;
   } else if (!hypothesis.certain || !keyframe.pyramid) {
@@ -204,11 +205,11 @@ std::optional<Relocation> Relocaliser::confirmed(const Map& map, const Frame& fr
   }
   const SE3 T_cam_odom = found.T_odom_cam.inverse();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (tracks[i]) {
+    if (const std::optional<Vector2d>& track = tracks[i]) {
       const Vector3d p_cam = T_cam_odom * map.find_point(keyframe.points[i])->p_odom;
-      const Vector2d off = camera_.project(p_cam) - camera_.undistort(*tracks[i]);
+      const Vector2d off = camera_.project(p_cam) - camera_.undistort(*track);
       if (p_cam.z() > 0 && off.norm() < kFollowedPx) {
-        found.tracks.push_back({keyframe.points[i], *tracks[i]});
+        found.tracks.push_back({keyframe.points[i], *track});
       }
     }
   }
@@ -242,12 +243,12 @@ std::optional<Relocation> Relocaliser::by_depth(const Map& map, const Frame& fra
   if (keyframe.points.size() >= kTextured) {
     const bool certain =
         depth_confirms(frame, keyframe, found) && features_support(frame, keyframe, T_odom_cam);
-    return confirmed(map, frame, id, {T_odom_cam, certain});
+    return confirmed(map, frame, id, {.T_odom_cam = T_odom_cam, .certain = certain});
   }
   if (found.overlap < kDepthDecides || found.degenerate_directions > 0) {
     return std::nullopt;
   }
-  return Relocation{id, T_odom_cam, {}};
+  return Relocation{.keyframe = id, .T_odom_cam = T_odom_cam, .tracks = {}};
 }
 
 std::vector<KeyframeId> Relocaliser::candidates(const Map& map, const Frame& frame) {
@@ -260,7 +261,7 @@ std::vector<KeyframeId> Relocaliser::candidates(const Map& map, const Frame& fra
   }
   const auto ranking = map.places().query(*frame.place, map.places().size());
   for (const PlaceCandidate& candidate : peaks(ranking, kAlikeByFeatures, kStretch)) {
-    if (std::find(chosen.begin(), chosen.end(), candidate.keyframe) == chosen.end()) {
+    if (std::ranges::find(chosen, candidate.keyframe) == chosen.end()) {
       chosen.push_back(candidate.keyframe);
     }
   }

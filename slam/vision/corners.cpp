@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -36,11 +36,11 @@ std::array<int, kPatchRadiusPx + 1> half_widths() {
 
 /// Direction from a pixel to the centroid of the intensities around it [deg], 0 to 360.
 float orientation(const cv::Mat1b& image, const cv::Point& centre) {
-  static const std::array<int, kPatchRadiusPx + 1> kHalfWidths = half_widths();
+  static const std::array<int, kPatchRadiusPx + 1> widths = half_widths();
   int moment_x = 0;
   int moment_y = 0;
   for (int dy = -kPatchRadiusPx; dy <= kPatchRadiusPx; ++dy) {
-    const int half = kHalfWidths[static_cast<std::size_t>(std::abs(dy))];
+    const int half = widths[static_cast<std::size_t>(std::abs(dy))];
     const unsigned char* row = image.ptr(centre.y + dy) + centre.x;
     int sum = 0;
     for (int dx = -half; dx <= half; ++dx) {
@@ -83,12 +83,11 @@ std::vector<cv::KeyPoint> faint_corners(const cv::Mat1b& gray, const CellCount& 
       if (!cells.has_room(x, y) || cell.empty()) {
         continue;
       }
-      for (const cv::KeyPoint& corner : fast(gray, cell, config.fast_threshold)) {
-        const bool own = cv::Rect{x, y, config.cell_px, config.cell_px}.contains(corner.pt);
-        if (own && corner.response < kClearThreshold) {
-          found.push_back(corner);
-        }
-      }
+      const cv::Rect own{x, y, config.cell_px, config.cell_px};
+      std::ranges::copy_if(fast(gray, cell, config.fast_threshold), std::back_inserter(found),
+                           [&](const cv::KeyPoint& corner) {
+                             return own.contains(corner.pt) && corner.response < kClearThreshold;
+                           });
     }
   }
   return found;
@@ -97,7 +96,7 @@ std::vector<cv::KeyPoint> faint_corners(const cv::Mat1b& gray, const CellCount& 
 /// Leaves the strongest that there is room for, strongest first.
 void keep_strongest(std::vector<cv::KeyPoint>& corners, CellCount& cells) {
   // By place where equally strong, so that the order is one whatever the detector's is.
-  std::sort(corners.begin(), corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  std::ranges::sort(corners, [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
     return std::tuple{-a.response, a.octave, a.pt.y, a.pt.x} <
            std::tuple{-b.response, b.octave, b.pt.y, b.pt.x};
   });

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/geometry.hpp"
+
 #include "cloud/gicp.hpp"
 #include "views.hpp"
 

@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "geoflow/hal/geometry.hpp"
+
 #include "views.hpp"
 
 namespace geoflow::slam {

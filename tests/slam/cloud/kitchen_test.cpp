@@ -1,10 +1,16 @@
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"
 

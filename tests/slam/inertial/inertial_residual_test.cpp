@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <random>
+#include <string>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>

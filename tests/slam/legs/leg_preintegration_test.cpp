@@ -1,6 +1,9 @@
 #include "legs/leg_preintegration.hpp"
 
+#include <cmath>
+#include <cstddef>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>

@@ -1,13 +1,19 @@
 #include "recordings.hpp"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstddef>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
 namespace geoflow::tests {

@@ -9,6 +9,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/leg_kinematics.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "tests/support/data.hpp"
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <random>
+#include <string>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>

@@ -1,6 +1,9 @@
 #include "legs/standing.hpp"
 
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 #include <random>
 
 #include <gtest/gtest.h>

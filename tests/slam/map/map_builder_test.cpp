@@ -1,11 +1,14 @@
 #include "map/map_builder.hpp"
 
+#include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
 
 #include "map/map.hpp"

@@ -14,9 +14,11 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/slam/config.hpp"
 #include "geoflow/tools/simulator/imu_simulator.hpp"
 #include "geoflow/tools/simulator/leg_simulator.hpp"
 #include "geoflow/tools/simulator/mount.hpp"
+#include "geoflow/tools/simulator/walk.hpp"
 
 #include "simulator/walk_fixture.hpp"
 

@@ -61,7 +61,7 @@ Map drifted_map() {
   return map;
 }
 
-DepthEdge loop(std::size_t from, std::size_t to, const SE3& T_from_to) {
+RelativeEdge loop(std::size_t from, std::size_t to, const SE3& T_from_to) {
   constexpr double kSigma = 0.01;  // [rad], [m]
   return {id_of(from), id_of(to), T_from_to, Matrix6d::Identity() / (kSigma * kSigma)};
 }
@@ -75,7 +75,7 @@ TEST(PoseGraph, ClosesALoopAndSpreadsTheErrorOverTheWay) {
   const double before_end = error_m(map, kKeyframes - 1);
   const double before_half = error_m(map, kKeyframes / 2);
   ASSERT_GT(before_end, 0.1);
-  const DepthEdge closed = loop(0, kKeyframes - 1, true_step(0, kKeyframes - 1));
+  const RelativeEdge closed = loop(0, kKeyframes - 1, true_step(0, kKeyframes - 1));
   EXPECT_TRUE(moves_map(map, closed));
   map.add_edge(closed);
   const PoseGraphSolution solution = solve_pose_graph(pose_graph(map));

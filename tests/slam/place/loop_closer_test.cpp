@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
@@ -125,7 +126,7 @@ class LoopCloserOnKitchen : public testing::Test {
   static std::size_t frame_back(std::size_t k) { return kStep * (kBack - 1 - k) + 4; }
 
   /// Distance and angle between what a loop says and the reference.
-  [[nodiscard]] Vector6d error(const DepthEdge& edge) const {
+  [[nodiscard]] Vector6d error(const RelativeEdge& edge) const {
     const SE3& T_world_from = places_->reference(frame_of_[static_cast<std::size_t>(edge.from)]);
     const SE3& T_world_to = places_->reference(frame_of_[static_cast<std::size_t>(edge.to)]);
     const SE3& T_from_to = edge.T_from_to;
@@ -153,7 +154,7 @@ TEST_F(LoopCloserOnKitchen, ClosesALoopThatTheReferenceHas) {
       EXPECT_LT(error(loop.edge).tail<3>().norm(), 0.06);
       EXPECT_LT(error(loop.edge).head<3>().norm(), 0.03);
     }
-    for (const DepthEdge& edge : closer_->consider(map_, found)) {
+    for (const RelativeEdge& edge : closer_->consider(map_, found)) {
       map_.add_edge(edge);
       ++closed;
     }

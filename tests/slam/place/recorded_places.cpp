@@ -6,11 +6,17 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 #include "vision/place_view.hpp"

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
 #include "map/map_builder.hpp"

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
 
 #include "slam/vision/textured_wall.hpp"

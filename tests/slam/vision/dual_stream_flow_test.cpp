@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
 
 #include "slam/vision/textured_wall.hpp"
