@@ -96,8 +96,8 @@ class Verifier {
     if (depth) {
       targets.push_back({old.cloud.get(), SE3{}});
     }
-    // A radian, a metre: nothing.
-    const PosePrior prior{.T_odom_cam = T_old_new, .information = Matrix6d::Identity()};
+    const PosePrior prior{.T_odom_cam = T_old_new,  // frames: the old camera stands for odom
+                          .information = Matrix6d::Identity()};  // a radian, a metre: nothing
     const PoseSolution solution = optimiser_.solve({.matches = matches,
                                                     .cloud = problem_.newest.cloud.get(),
                                                     .targets = targets,
@@ -128,7 +128,7 @@ class Verifier {
   [[nodiscard]] VisualMatch match(const LoopView& old, std::size_t in_new,
                                   std::size_t in_old) const {
     const PlaceView& seen = *problem_.newest.place;
-    return {.p_odom = old.place->p_cam[in_old],
+    return {.p_odom = old.place->p_cam[in_old],  // frames: the old camera stands for odom
             .pixel = camera_.undistort(seen.features[in_new].pixel),
             .depth_m = seen.p_cam[in_new].z()};
   }

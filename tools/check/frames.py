@@ -27,7 +27,7 @@ KEEPING = {"rotation", "rotation_matrix", "toRotationMatrix", "matrix", "linear"
            "normalized", "get"}
 TO_VECTOR = {"translation"}
 # Names of roles that any frame may take when it is passed on.
-ROLES = {"parent", "child", "target", "source"}
+ROLES = {"parent", "child", "target", "source", "from", "to"}
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
