@@ -6,7 +6,9 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/hal/log.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"

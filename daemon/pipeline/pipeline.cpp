@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <pthread.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <malloc.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
@@ -34,8 +35,10 @@ drivers::RecordingOptions recording_options(const Config& config) {
 void keep_freed_memory() {
   constexpr int kNeverMapSeparatelyBytes = 1 << 30;
   constexpr int kKeepBytes = 1 << 28;
+  // NOLINTBEGIN(concurrency-mt-unsafe): of the run's threads none exists yet
   ::mallopt(M_MMAP_THRESHOLD, kNeverMapSeparatelyBytes);
   ::mallopt(M_TRIM_THRESHOLD, kKeepBytes);
+  // NOLINTEND(concurrency-mt-unsafe)
 }
 
 }  // namespace

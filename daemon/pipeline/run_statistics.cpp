@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
@@ -11,6 +11,7 @@
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/stage.hpp"
+#include "geoflow/timesync/clock_fit.hpp"
 #include "geoflow/timesync/counters.hpp"
 
 namespace geoflow::daemon {

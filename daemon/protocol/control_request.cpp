@@ -1,12 +1,13 @@
 #include "protocol/control_request.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include <nlohmann/json.hpp>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 
@@ -41,7 +42,7 @@ Result<json> parse_object(std::string_view line) {
 Result<void> only_keys(const json& object, std::initializer_list<std::string_view> allowed) {
   for (const auto& item : object.items()) {
     const bool known = item.key() == "cmd" || item.key() == "id" ||
-                       std::find(allowed.begin(), allowed.end(), item.key()) != allowed.end();
+                       std::ranges::find(allowed, item.key()) != allowed.end();
     if (!known) {
       return fail(ErrorCode::kInvalidArgument, "unknown key \"{}\"", item.key());
     }

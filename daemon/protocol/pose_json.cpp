@@ -1,6 +1,8 @@
-#include <cstddef>
+#include <array>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -11,9 +13,9 @@
 namespace geoflow::daemon {
 namespace {
 
-template <std::size_t kSize>
-nlohmann::json array(const double (&values)[kSize]) {  // NOLINT(modernize-avoid-c-arrays): C header
-  return nlohmann::json(std::span<const double>{values});
+nlohmann::json array(std::span<const double> values) {
+  // NOLINTNEXTLINE(modernize-return-braced-init-list): braces would make it an array of one array
+  return nlohmann::json(values);
 }
 
 nlohmann::json sensors(std::uint32_t bits) {

@@ -9,9 +9,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/hal/geometry.hpp"
@@ -29,7 +31,7 @@ tl::unexpected<Refusal> refuse(geoflow_refusal reason, std::string text) {
 
 std::string printable(std::string_view text) {
   std::string out{text.substr(0, text.find('\0'))};
-  std::replace_if(out.begin(), out.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  std::ranges::replace_if(out, [](char c) { return c < ' ' || c > '~'; }, '?');
   return out;
 }
 

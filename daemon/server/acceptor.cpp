@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
+#include <tl/expected.hpp>
+#include <unistd.h>
 
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 #include <sys/socket.h>
+#include <sys/types.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"

@@ -15,7 +15,9 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/types.h>
 #include <sys/un.h>
+#include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"

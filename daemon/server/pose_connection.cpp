@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <sys/socket.h>
+#include <sys/types.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
@@ -111,7 +112,7 @@ PoseConnection::Outcome PoseConnection::flush(HostTime now) {
     pending_.reset();
     waiting_since_ = now;
   }
-  return ending_ ? send_end() : Outcome::kOpen;
+  return ending_ ? send_end(*ending_) : Outcome::kOpen;
 }
 
 PoseConnection::Outcome PoseConnection::finish(geoflow_end_reason reason, HostTime now) {
@@ -122,11 +123,11 @@ PoseConnection::Outcome PoseConnection::finish(geoflow_end_reason reason, HostTi
     waiting_since_ = now;
   }
   ending_ = reason;
-  return pending_ ? Outcome::kOpen : send_end();
+  return pending_ ? Outcome::kOpen : send_end(reason);
 }
 
-PoseConnection::Outcome PoseConnection::send_end() {
-  const geoflow_end record{.reason = static_cast<std::uint32_t>(*ending_), .reserved = 0};
+PoseConnection::Outcome PoseConnection::send_end(geoflow_end_reason reason) {
+  const geoflow_end record{.reason = static_cast<std::uint32_t>(reason), .reserved = 0};
   const Sent result = send(encode_record(GEOFLOW_END, 0, sent_, record));
   ended_ = result == Sent::kYes;
   return result == Sent::kFull ? Outcome::kOpen : Outcome::kFinished;

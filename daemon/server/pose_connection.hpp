@@ -57,7 +57,7 @@ class PoseConnection {
   [[nodiscard]] Outcome greet(std::span<const std::byte> datagram, const geoflow_welcome& welcome);
   [[nodiscard]] Sent send(std::span<const std::byte> record);
   [[nodiscard]] Sent send_pose(const geoflow_pose& pose);
-  [[nodiscard]] Outcome send_end();
+  [[nodiscard]] Outcome send_end(geoflow_end_reason reason);
 
   Connection connection_;
   std::uint32_t id_;

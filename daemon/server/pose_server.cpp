@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,7 @@
 #include <sys/epoll.h>
 #include <sys/random.h>
 #include <sys/socket.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"
@@ -35,14 +37,13 @@ namespace {
 using Outcome = PoseConnection::Outcome;
 
 /// The kernel's boot id as 16 bytes; zero where it cannot be read.
-void read_boot_id(std::uint8_t (
-    &id)[16]) {  // NOLINT(modernize-avoid-c-arrays,readability-magic-numbers): C header
+void read_boot_id(std::span<std::uint8_t> id) {
   std::ifstream file{"/proc/sys/kernel/random/boot_id"};
   std::string text;
   std::getline(file, text);
   std::erase(text, '-');
   constexpr int kHexadecimal = 16;
-  for (std::size_t i = 0; i < sizeof id && 2 * i + 1 < text.size(); ++i) {
+  for (std::size_t i = 0; i < id.size() && 2 * i + 1 < text.size(); ++i) {
     std::from_chars(&text[2 * i], &text[2 * i] + 2, id[i], kHexadecimal);
   }
 }

@@ -1,5 +1,6 @@
 #include "src/command_line.hpp"
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <variant>
@@ -9,6 +10,7 @@
 #include <CLI/Error.hpp>
 #include <CLI/Formatter.hpp>
 #include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/version.hpp"

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 #include <sys/epoll.h>
+#include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/daemon/config.hpp"
@@ -146,7 +147,7 @@ class Daemon {
     }
   }
 
-  nlohmann::json status() const {
+  [[nodiscard]] nlohmann::json status() const {
     nlohmann::json status = worker_ ? worker_->status() : nlohmann::json::object();
     status["version"] = std::string{version()};
     status["pid"] = ::getpid();
@@ -191,8 +192,8 @@ Result<ExitCode> run_daemon(const Config& config) {
   if (!done) {
     return tl::unexpected{std::move(done.error())};
   }
-  if (daemon.failure()) {
-    return tl::unexpected{*daemon.failure()};
+  if (const std::optional<Error>& failure = daemon.failure()) {
+    return tl::unexpected{*failure};
   }
   return ExitCode::kOk;
 }

@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/daemon.hpp"
 #include "geoflow/hal/exit_code.hpp"
 

@@ -1,6 +1,5 @@
 #include "geoflow/daemon/pose_client.hpp"
 
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
@@ -13,10 +12,11 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/types.h>
 #include <sys/un.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
@@ -114,28 +114,30 @@ Result<PoseClient> PoseClient::connect(const std::filesystem::path& socket,
   if (!answer) {
     return tl::unexpected{answer.error()};
   }
-  if (!*answer || (*answer)->empty()) {
+  const std::optional<std::vector<std::byte>>& bytes_of_answer = *answer;
+  if (!bytes_of_answer || bytes_of_answer->empty()) {
     return fail(ErrorCode::kUnavailable, "{}: the daemon does not answer", socket.string());
   }
-  return judge_answer(**answer)
+  return judge_answer(*bytes_of_answer)
       .map([&](const geoflow_welcome& welcome) { return PoseClient{std::move(*fd), welcome}; })
       .map_error([&](Error error) { return std::move(error).in(socket.string()); });
 }
 
 Result<PoseClient::Received> PoseClient::receive(Duration timeout) {
   while (true) {
-    const auto bytes = receive_datagram(fd_.get(), timeout);
-    if (!bytes) {
-      return tl::unexpected{bytes.error()};
+    const auto received = receive_datagram(fd_.get(), timeout);
+    if (!received) {
+      return tl::unexpected{received.error()};
     }
-    if (!*bytes) {
+    const std::optional<std::vector<std::byte>>& bytes = *received;
+    if (!bytes) {
       return TimedOut{};
     }
     const HostTime now = HostClock::now();
-    if ((*bytes)->empty()) {
+    if (bytes->empty()) {
       return Ended{};
     }
-    const auto record = parse_record(**bytes);
+    const auto record = parse_record(*bytes);
     if (!record) {
       return tl::unexpected{record.error()};
     }

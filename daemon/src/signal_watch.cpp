@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
+#include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"

@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <memory>
 #include <stop_token>
-#include <string>
 #include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 #include <pthread.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"

@@ -1,3 +1,8 @@
+#include <cstdint>
+#include <string>
+
+#include "geoflow/hal/unique_fd.hpp"
+
 #include "server_fixture.hpp"
 
 namespace geoflow::daemon {

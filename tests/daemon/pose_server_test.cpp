@@ -1,3 +1,20 @@
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "geoflow/daemon/pose_client.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/unique_fd.hpp"
+#include "tests/support/data.hpp"
+
 #include "server_fixture.hpp"
 
 namespace geoflow::daemon {

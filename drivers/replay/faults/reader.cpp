@@ -145,7 +145,7 @@ class FaultReader final : public RecordingReader {
 
 std::unique_ptr<RecordingReader> with_faults(std::unique_ptr<RecordingReader> inner,
                                              const std::vector<Fault>& faults, std::uint64_t seed) {
-  return std::make_unique<FaultReader>(std::move(inner), std::move(faults), seed);
+  return std::make_unique<FaultReader>(std::move(inner), faults, seed);
 }
 
 }  // namespace geoflow::drivers::faults

@@ -9,6 +9,8 @@
 #ifndef GEOFLOW_PROTOCOL_H
 #define GEOFLOW_PROTOCOL_H
 
+/* NOLINTBEGIN(modernize-*,readability-*): C's names, and its only constants for #if; sizes and
+ * offsets below are docs/protocol.md's */
 #include <stddef.h>
 #include <stdint.h>
 
@@ -172,4 +174,5 @@ GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, clock_flags) == 388, "pose")
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, frames_dropped) == 412, "pose");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_end) == 8, "end");
 
+/* NOLINTEND(modernize-*,readability-*) */
 #endif /* GEOFLOW_PROTOCOL_H */

@@ -74,12 +74,11 @@ template <typename Payload>
 }
 
 /// Copies text into a fixed field, cut to leave a terminating zero.
-template <std::size_t kSize>
-void copy_text(char (&field)[kSize],
-               std::string_view text) noexcept {  // NOLINT(modernize-avoid-c-arrays): C header
-  const std::size_t length = std::min(text.size(), kSize - 1);
-  std::memcpy(&field[0], text.data(), length);
-  std::memset(&field[length], 0, kSize - length);
+template <std::size_t Size>
+// NOLINTNEXTLINE(modernize-avoid-c-arrays): C header
+void copy_text(char (&field)[Size], std::string_view text) noexcept {
+  const std::size_t length = text.copy(&field[0], Size - 1);
+  std::memset(&field[length], 0, Size - length);
 }
 
 /// What the pipeline knows of one estimate besides the estimate.
