@@ -30,7 +30,7 @@ std::string error_of(std::string_view text) {
 }
 
 std::string read_shipped() {
-  std::ifstream file{GEOFLOW_SHIPPED_CONFIG};
+  const std::ifstream file{GEOFLOW_SHIPPED_CONFIG};
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
@@ -39,7 +39,6 @@ std::string read_shipped() {
 TEST(Config, TheShippedFileHoldsEveryKeyWithItsDefault) {
   const auto shipped = load_config(GEOFLOW_SHIPPED_CONFIG);
   ASSERT_TRUE(shipped) << shipped.error().message;
-  const std::string text = read_shipped();
   const std::vector<ConfigValue> defaults = list_keys(Config{});
   const std::vector<ConfigValue> values = list_keys(*shipped);
   ASSERT_EQ(values.size(), defaults.size());

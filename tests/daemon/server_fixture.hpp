@@ -107,7 +107,7 @@ class ServerTest : public testing::Test {
     return true;
   }
 
-  PoseClient connect() {
+  [[nodiscard]] PoseClient connect() const {
     auto client = PoseClient::connect(config_.pose, {.name = "test"});
     EXPECT_TRUE(client) << client.error().message;
     return std::move(*client);
@@ -121,6 +121,10 @@ class ServerTest : public testing::Test {
   }
   static UniqueFd raw_socket(const std::filesystem::path& path, int type) {
     UniqueFd fd{::socket(AF_UNIX, type | SOCK_CLOEXEC, 0)};
+    if (!fd) {
+      ADD_FAILURE() << "no socket";
+      return fd;
+    }
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(&address.sun_path[0], path.c_str(), sizeof address.sun_path - 1);

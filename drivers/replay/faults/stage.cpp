@@ -118,8 +118,7 @@ class ReorderStage final : public RandomStage {
   void finish(std::vector<Event>& out) override {
     for (auto& held : held_) {
       if (held) {
-        out.push_back(*std::move(held));
-        held.reset();
+        out.push_back(*std::exchange(held, std::nullopt));
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -12,6 +13,8 @@
 #include <rapidcheck/gtest.h>
 
 #include "geoflow/drivers/bag_writer.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "tests/support/data.hpp"
 
 #include "bag/small_bag.hpp"

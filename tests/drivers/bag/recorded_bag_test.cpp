@@ -1,8 +1,10 @@
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/result.hpp"
 #include "tests/support/data.hpp"
 
 #include "replay/bag/bag.hpp"

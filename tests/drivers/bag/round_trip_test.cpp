@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cstddef>
@@ -6,6 +8,8 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -15,10 +19,15 @@
 #include <rapidcheck/gtest.h>
 
 #include "geoflow/drivers/bag_writer.hpp"
+#include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
+#include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
 #include "tests/support/data.hpp"
 
 #include "replay/bag/bag.hpp"

@@ -6,10 +6,17 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/time.hpp"
 
 #include "replay/bag/transforms.hpp"
 #include "replay/cdr/messages.hpp"

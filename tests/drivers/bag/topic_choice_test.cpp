@@ -1,10 +1,14 @@
 #include "replay/bag/topic_choice.hpp"
 
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "geoflow/drivers/recording.hpp"
 
 #include "replay/cdr/messages.hpp"
 

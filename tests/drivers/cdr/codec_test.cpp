@@ -16,6 +16,8 @@
 #include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
+#include "geoflow/hal/result.hpp"
+
 #include "cdr/random_messages.hpp"
 #include "replay/cdr/messages.hpp"
 
@@ -58,8 +60,8 @@ class FastCdrOracle {
       write(value);
     }
   }
-  template <typename T, std::size_t kSize>
-  void write(const std::array<T, kSize>& values) {
+  template <typename T, std::size_t Size>
+  void write(const std::array<T, Size>& values) {
     for (const T& value : values) {
       write(value);
     }

@@ -48,8 +48,8 @@ class RandomMessages {
       fill(value);
     }
   }
-  template <typename T, std::size_t kSize>
-  void fill(std::array<T, kSize>& values) {
+  template <typename T, std::size_t Size>
+  void fill(std::array<T, Size>& values) {
     for (T& value : values) {
       fill(value);
     }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <utility>
 
@@ -8,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +21,10 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 #include "tests/support/data.hpp"
 
 #include "replay/fixtures.hpp"
