@@ -1,6 +1,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include <cmath>
+#include <cstddef>
 #include <random>
 #include <vector>
 

@@ -10,7 +10,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/clock_fit.hpp"
 #include "geoflow/timesync/clock_model.hpp"
 #include "geoflow/timesync/wrap.hpp"
 #include "tests/support/data.hpp"

@@ -1,6 +1,9 @@
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -11,7 +14,9 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/counters.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
+#include "geoflow/timesync/synchroniser_config.hpp"
 
 #include "scripted_streams.hpp"
 

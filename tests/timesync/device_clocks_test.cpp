@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +13,7 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/counters.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 #include "tests/support/data.hpp"
 

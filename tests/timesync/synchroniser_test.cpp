@@ -1,6 +1,7 @@
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/counters.hpp"
+#include "geoflow/timesync/synchroniser_config.hpp"
 
 #include "scripted_streams.hpp"
 

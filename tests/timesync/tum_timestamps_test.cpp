@@ -12,6 +12,7 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/timesync/counters.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 #include "tests/support/data.hpp"
 

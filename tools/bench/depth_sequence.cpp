@@ -4,11 +4,18 @@
 #include <chrono>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/tools/trajectory_file.hpp"

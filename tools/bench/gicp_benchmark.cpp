@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_cloud.h>
@@ -13,6 +15,12 @@
 #include <pcl/registration/gicp.h>
 #include <tbb/global_control.h>
 #include <time.h>
+#include <tl/expected.hpp>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/result.hpp"
 
 #include "bench/depth_sequence.hpp"
 #include "cloud/cell_grid.hpp"

@@ -14,6 +14,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/evaluate/alignment.hpp"
+#include "geoflow/tools/evaluate/association.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
 #include "geoflow/tools/evaluate/statistics.hpp"

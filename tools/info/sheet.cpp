@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
+#include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <fstream>
 #include <memory>
@@ -14,6 +15,7 @@
 #include <CLI/Validators.hpp>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"

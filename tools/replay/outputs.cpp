@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/tools/trajectory_file.hpp"

@@ -4,6 +4,8 @@
 #include <stop_token>
 #include <utility>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/lock_step_runner.hpp"
 #include "geoflow/daemon/run.hpp"

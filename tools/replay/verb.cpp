@@ -11,6 +11,7 @@
 #include <CLI/App.hpp>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
+#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"

@@ -18,6 +18,7 @@
 #include "geoflow/tools/simulator/leg_simulator.hpp"
 #include "geoflow/tools/simulator/recording_options.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/simulation.hpp"
 #include "geoflow/tools/simulator/walk_options.hpp"
 
 namespace geoflow::tools {

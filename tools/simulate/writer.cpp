@@ -21,6 +21,7 @@
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/simulation.hpp"
 #include "geoflow/tools/simulator/truth_files.hpp"
 #include "geoflow/tools/simulator/tum_writer.hpp"
 

@@ -1,5 +1,6 @@
 #include "geoflow/tools/console.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <string>

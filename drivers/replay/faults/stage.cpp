@@ -117,8 +117,8 @@ class ReorderStage final : public RandomStage {
 
   void finish(std::vector<Event>& out) override {
     for (auto& held : held_) {
-      if (held) {
-        out.push_back(*std::exchange(held, std::nullopt));
+      if (std::optional<Event> last = std::exchange(held, std::nullopt)) {
+        out.push_back(*std::move(last));
       }
     }
   }

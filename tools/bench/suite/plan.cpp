@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geoflow/hal/result.hpp"
+#include "geoflow/tools/bench/processes.hpp"
 
 namespace geoflow::tools {
 

@@ -1,10 +1,13 @@
 #include "geoflow/tools/evaluate/association.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <iterator>
 #include <utility>
 #include <vector>
+
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"

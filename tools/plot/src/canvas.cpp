@@ -12,6 +12,7 @@
 
 #include <cairo-svg.h>
 #include <cairo.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/plot.hpp"

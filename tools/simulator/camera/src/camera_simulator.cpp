@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <tbb/parallel_invoke.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
@@ -15,6 +16,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/mount.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"

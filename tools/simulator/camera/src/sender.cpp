@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 

@@ -14,6 +14,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/simulation.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 namespace geoflow::simulator {

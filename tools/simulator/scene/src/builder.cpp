@@ -8,7 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/canvas.hpp"
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 

@@ -1,6 +1,7 @@
 #include <utility>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 

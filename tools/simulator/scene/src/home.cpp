@@ -2,8 +2,10 @@
 #include <utility>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
 #include "src/furniture.hpp"

@@ -1,7 +1,9 @@
 #include <numbers>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
 #include "src/furniture.hpp"

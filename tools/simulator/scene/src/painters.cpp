@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 

@@ -2,6 +2,7 @@
 #include <numbers>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 

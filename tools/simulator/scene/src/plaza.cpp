@@ -1,6 +1,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 

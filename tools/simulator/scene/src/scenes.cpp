@@ -12,6 +12,7 @@
 #include "geoflow/hal/nearest_name.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 

@@ -1,5 +1,7 @@
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
 #include "src/layouts.hpp"

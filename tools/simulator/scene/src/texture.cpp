@@ -1,6 +1,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
