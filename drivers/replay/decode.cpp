@@ -23,7 +23,6 @@
 namespace geoflow::drivers {
 namespace {
 
-constexpr int kLargestSide = 8192;
 constexpr int kDepthBits = 16;
 
 const char* stream_name(ImageStream stream) {

@@ -11,9 +11,12 @@
 
 namespace geoflow::drivers {
 
+/// No image is wider or higher [px].
+inline constexpr int kLargestSide = 8192;
+
 /// What an image must be and become.
 struct DecodeOptions {
-  int width = 0;               ///< [px]; 0: whatever the image says, up to 8192
+  int width = 0;               ///< [px]; 0: whatever the image says, up to kLargestSide
   int height = 0;              ///< [px]
   bool color_as_gray = false;  ///< colour becomes kGray8 instead of kBgr8
   // NOLINTNEXTLINE(readability-magic-numbers): named by its member

@@ -15,8 +15,8 @@ namespace geoflow::drivers {
 
 std::string_view name(FaultKind kind) noexcept {
   constexpr std::array<std::string_view, kFaultKindCount> kNames = {
-      "drop", "delay",        "duplicate",   "reorder",    "stuck",      "nan",
-      "gap",  "clock_offset", "clock_drift", "clock_jump", "clock_wrap", "truncate"};
+      "drop",         "delay",       "duplicate",  "reorder",    "stuck",    "nan",  "gap",
+      "clock_offset", "clock_drift", "clock_jump", "clock_wrap", "truncate", "cover"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

@@ -229,8 +229,10 @@ class TableReader {
       fault.streams = only({StreamId::kLegs, StreamId::kBodyVelocity});
     }
     const bool images = (*streams & only({StreamId::kColor, StreamId::kDepth})).any();
-    if (fault.kind == FaultKind::kTruncate && !images) {
-      return wrong(node, "stream", "only images can be truncated: color, depth or camera");
+    const bool for_images = fault.kind == FaultKind::kTruncate || fault.kind == FaultKind::kCover;
+    if (for_images && !images) {
+      return wrong(node, "stream",
+                   fmt::format("{} is for images: color, depth or camera", name(fault.kind)));
     }
     if (fault.kind == FaultKind::kNan && images) {
       return wrong(node, "stream", "nan is for imu, legs and body_velocity");

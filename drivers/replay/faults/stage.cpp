@@ -1,5 +1,6 @@
 #include "replay/faults/stage.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -14,9 +15,11 @@
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "replay/decode.hpp"
 #include "replay/faults/script.hpp"
 #include "replay/reader.hpp"
 
@@ -222,6 +225,40 @@ class TruncateStage final : public RandomStage {
   }
 };
 
+/// A black image without depth, of the size of what it replaces.
+class CoverStage final : public RandomStage {
+ public:
+  using RandomStage::RandomStage;
+
+ protected:
+  void strike(Event event, StreamId stream, std::vector<Event>& out) override {
+    if (auto* image = std::get_if<ImageArrival>(&event); image != nullptr && cover(image->sample)) {
+      count(stream);
+    }
+    out.push_back(std::move(event));
+  }
+
+ private:
+  /// False where no size can be read that an image has: the decoder will say so.
+  static bool cover(EncodedImage& image) {
+    if (image.encoding == ImageEncoding::kCompressed) {
+      const auto header = read_header(image.bytes);
+      if (!header || std::max(header->width, header->height) > kLargestSide) {
+        return false;
+      }
+      const bool depth = image.stream == ImageStream::kDepth;
+      const ImageShape shape{.width = header->width,
+                             .height = header->height,
+                             .format = depth ? PixelFormat::kDepth16 : PixelFormat::kGray8};
+      image.encoding = ImageEncoding::kRaw;
+      image.raw = {.shape = shape, .step_bytes = shape.row_bytes()};
+      image.bytes.resize(shape.size_bytes());
+    }
+    std::ranges::fill(image.bytes, std::byte{0});
+    return true;
+  }
+};
+
 }  // namespace
 
 bool is_clock_fault(FaultKind kind) noexcept {
@@ -246,6 +283,8 @@ std::unique_ptr<Stage> make_stage(const Fault& fault, const StageContext& contex
       return std::make_unique<NanStage>(fault, context);
     case FaultKind::kTruncate:
       return std::make_unique<TruncateStage>(fault, context);
+    case FaultKind::kCover:
+      return std::make_unique<CoverStage>(fault, context);
     case FaultKind::kClockOffset:
     case FaultKind::kClockDrift:
     case FaultKind::kClockJump:

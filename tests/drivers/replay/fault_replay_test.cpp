@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cstddef>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -5,6 +7,7 @@
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "tests/support/data.hpp"
 
@@ -45,6 +48,31 @@ TEST(FaultsInAReplay, AreCountedInAReplay) {
   EXPECT_THAT(message_of(RecordedStreams::open(
                   {.path = directory.path(), .faults = directory.path() / "none.toml"})),
               HasSubstr("none.toml"));
+}
+
+TEST(FaultsInAReplay, ACoveredLensSeesBlackAndNoDepth) {
+  const TemporaryDirectory directory;
+  tests::write_tum(directory.path(), 10);
+  const auto script = directory.path() / "faults.toml";
+  tests::write_text(script, "[[fault]]\nkind = 'cover'\nstream = 'camera'\nuntil_s = 0.03\n");
+  auto streams = RecordedStreams::open({.path = directory.path(), .faults = script});
+  ASSERT_TRUE(streams) << streams.error().message;
+  tests::Recorder recorder;
+  ASSERT_TRUE((*streams)->camera().start(recorder));
+  EXPECT_THAT(tests::drain(**streams), testing::IsEmpty());
+  EXPECT_EQ((*streams)->faults().of(FaultKind::kCover, StreamId::kColor), 1U);
+  EXPECT_EQ((*streams)->faults().of(FaultKind::kCover, StreamId::kDepth), 1U);
+  const auto dark = [](const FrameRef& image) {
+    return std::ranges::all_of(image.bytes(), [](std::byte byte) { return byte == std::byte{0}; });
+  };
+  ASSERT_EQ(recorder.colors.size(), 10U);
+  ASSERT_EQ(recorder.depths.size(), 10U);
+  EXPECT_EQ(recorder.colors[0].sample.image.shape(), recorder.colors[1].sample.image.shape());
+  EXPECT_EQ(recorder.depths[0].sample.image.shape(), recorder.depths[1].sample.image.shape());
+  EXPECT_TRUE(dark(recorder.colors[0].sample.image));
+  EXPECT_TRUE(dark(recorder.depths[0].sample.image));
+  EXPECT_FALSE(dark(recorder.colors[1].sample.image));
+  EXPECT_FALSE(dark(recorder.depths[1].sample.image));
 }
 
 TEST(FaultsInAReplay, KitchenWithEveryFaultReachesItsEnd) {

@@ -26,8 +26,9 @@ enum class FaultKind : std::uint8_t {
   kClockJump,    ///< its device clock steps once
   kClockWrap,    ///< its device clock is a 32-bit counter of microseconds
   kTruncate,     ///< its encoded image ends early
+  kCover,        ///< the lens is covered: black colour, no depth
 };
-inline constexpr std::size_t kFaultKindCount = 12;
+inline constexpr std::size_t kFaultKindCount = 13;
 
 /// The name used in fault scripts and reports: `drop`, `clock_wrap`, … Thread-safe.
 [[nodiscard]] std::string_view name(FaultKind kind) noexcept;
