@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
 
 #include <Eigen/Core>
 
@@ -46,23 +48,63 @@ double median_depth(const FrameRef& depth, const Eigen::Vector2d& raw) {
   return spread > kDiscontinuity * median ? 0 : median;
 }
 
+/// The cell of a raw pixel; none beyond the last whole cells.
+std::optional<std::size_t> cell_at(const CellGrid& grid, const Eigen::Vector2d& raw) {
+  const Eigen::Vector2i cell = (raw.array() / grid.cell_px()).floor().cast<int>();
+  if (cell.minCoeff() < 0 || cell.x() >= grid.columns() || cell.y() >= grid.rows()) {
+    return std::nullopt;
+  }
+  return static_cast<std::size_t>(cell.y() * grid.columns() + cell.x());
+}
+
 }  // namespace
+
+const Surfel* surface_at(const DepthCloud& cloud, const Eigen::Vector2d& raw,
+                         const Eigen::Vector3d& p_cam) {
+  if (const auto cell = cell_at(cloud.grid(), raw); cell && cloud.surfels()[*cell].valid()) {
+    return &cloud.surfels()[*cell];
+  }
+  constexpr int kFarthestCells = 12;
+  constexpr double kSamePlane =
+      0.02;  // of the distance: what a normal's error makes of the way there
+  const CellGrid& grid = cloud.grid();
+  const Eigen::Vector2i middle = (raw.array() / grid.cell_px()).floor().cast<int>();
+  const auto goes_on = [&](const Surfel& surfel) {
+    const Eigen::Vector3d from_surfel = p_cam - surfel.point.cast<double>();
+    return std::abs(surfel.normal.cast<double>().dot(from_surfel)) < kSamePlane * p_cam.norm();
+  };
+  const Surfel* nearest = nullptr;
+  int least = std::numeric_limits<int>::max();
+  for (int y = std::max(middle.y() - kFarthestCells, 0);
+       y <= std::min(middle.y() + kFarthestCells, grid.rows() - 1); ++y) {
+    for (int x = std::max(middle.x() - kFarthestCells, 0);
+         x <= std::min(middle.x() + kFarthestCells, grid.columns() - 1); ++x) {
+      const int in_row_order = y * grid.columns() + x;
+      const Surfel& surfel = cloud.surfels()[static_cast<std::size_t>(in_row_order)];
+      const int distance = (Eigen::Vector2i{x, y} - middle).squaredNorm();
+      if (distance < least && surfel.valid() && goes_on(surfel)) {
+        nearest = &surfel;
+        least = distance;
+      }
+    }
+  }
+  return nearest;
+}
 
 double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vector2d& raw) {
   const CellGrid& grid = cloud.grid();
   const double measured = median_depth(depth, raw) * cloud.pixels().unit_m;
-  const Eigen::Vector2i cell = (raw.array() / grid.cell_px()).floor().cast<int>();
-  if (measured == 0 || cell.x() >= grid.columns() || cell.y() >= grid.rows()) {
+  const std::optional<std::size_t> cell = cell_at(grid, raw);
+  if (measured == 0 || !cell) {
     return measured;
   }
-  const int in_row_order = cell.y() * grid.columns() + cell.x();
-  const auto index = static_cast<std::size_t>(in_row_order);
-  const Surfel& surfel = cloud.surfels()[index];
+  const Surfel& surfel = cloud.surfels()[*cell];
   if (!surfel.valid()) {
     return 0;
   }
-  const CellGrid::Ray& ray = grid.ray(index);
-  const Eigen::Vector2d middle = (cell.cast<double>().array() + 0.5) * grid.cell_px() - 0.5;
+  const CellGrid::Ray& ray = grid.ray(*cell);
+  const Eigen::Vector2d middle =
+      ((raw.array() / grid.cell_px()).floor() + 0.5) * grid.cell_px() - 0.5;
   const Eigen::Vector2d at =
       ray.centre.cast<double>() + ray.per_pixel.cast<double>() * (raw - middle);
   const Eigen::Vector3d normal = surfel.normal.cast<double>();

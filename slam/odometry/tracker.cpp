@@ -52,6 +52,7 @@ Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration
       calibration_{calibration},
       camera_{calibration.camera},
       flow_{config.flow, camera_},
+      refiner_{camera_},
       optimiser_{config.pose, config.mapping, gicp, camera_},
       orb_{config.features},
       relocaliser_{config, gicp, camera_},
@@ -102,8 +103,14 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
   const auto tracks = flow_.track(*previous_.pyramid, *current_.pyramid, seeds);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (const std::optional<Vector2d>& track = tracks[i]) {
-      Feature feature = feature_at(*track);
-      feature.point = previous_.features[i].point;
+      const std::optional<PointId>& id = previous_.features[i].point;
+      const MapPoint* point = id ? map.find_point(*id) : nullptr;
+      const std::optional<Vector2d> refined =
+          point == nullptr
+              ? std::nullopt
+              : refiner_.refine(map, *point, T_odom_cam_predicted, *current_.pyramid, *track);
+      Feature feature = feature_at(refined.value_or(*track));
+      feature.point = id;
       feature.anchor = previous_.features[i].anchor;
       feature.descriptor = previous_.features[i].descriptor;
       current_.features.push_back(feature);

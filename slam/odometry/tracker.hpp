@@ -14,6 +14,7 @@
 #include "map/map.hpp"
 #include "odometry/frame.hpp"
 #include "odometry/motion_model.hpp"
+#include "odometry/patch_refiner.hpp"
 #include "odometry/pose_optimiser.hpp"
 #include "place/relocaliser.hpp"
 #include "vision/dual_stream_flow.hpp"
@@ -87,6 +88,7 @@ class Tracker {
   Calibration calibration_;
   CameraModel camera_;
   DualStreamFlow flow_;
+  PatchRefiner refiner_;
   PoseOptimiser optimiser_;
   OrbExtractor orb_;
   Relocaliser relocaliser_;
