@@ -99,8 +99,9 @@ TEST_F(GeoflowdTest, SigtermStopsALoopingReplayAndSighupDoesNot) {
   Process process{daemon({"--realtime", "--loop"}), log("daemon")};
   PoseClient client = connect_when_up();
   std::uint32_t resets = 0;
+  bool hung_up = false;
   std::int64_t last_capture_ns = 0;
-  while (resets == 0) {
+  while (resets == 0 || !hung_up) {
     const auto received = client.receive(seconds{60});
     ASSERT_TRUE(received && std::holds_alternative<ReceivedPose>(*received));
     const geoflow_pose& pose = std::get<ReceivedPose>(*received).pose;
@@ -108,8 +109,9 @@ TEST_F(GeoflowdTest, SigtermStopsALoopingReplayAndSighupDoesNot) {
     EXPECT_GE(pose.t_publish_ns, pose.t_arrival_ns);
     last_capture_ns = pose.t_capture_ns;
     resets = pose.reset_counter;
-    if (pose.frame == 3) {
+    if (!hung_up && pose.frame >= 3) {  // a slow client may not see each frame
       process.send_signal(SIGHUP);
+      hung_up = true;
     }
   }
   process.send_signal(SIGTERM);

@@ -106,6 +106,9 @@ void Synchroniser::note_arrival(HostTime t_arrival) noexcept {
 /// Where colour itself was silent, the others' silence of that time says nothing: the whole camera
 /// was away.
 void Synchroniser::note_color(HostTime t_arrival) noexcept {
+  if (!is_plausible_stamp_ns(t_arrival.time_since_epoch().count())) {
+    return;
+  }
   if (last_color_ && t_arrival - *last_color_ > config_.silent_after) {
     listening_since_ = t_arrival;
   }

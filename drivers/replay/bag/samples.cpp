@@ -46,9 +46,9 @@ Result<Duration> to_duration(const ros::Time& stamp) {
 
 Result<ros::Time> to_stamp(Duration since_epoch) {
   const std::int64_t ns = since_epoch.count();
-  const std::int64_t nanosec =
-      ((ns % kNanosecondsPerSecond) + kNanosecondsPerSecond) % kNanosecondsPerSecond;
-  const std::int64_t sec = (ns - nanosec) / kNanosecondsPerSecond;
+  const std::int64_t rest = ns % kNanosecondsPerSecond;  // of the sign of ns
+  const std::int64_t nanosec = rest < 0 ? rest + kNanosecondsPerSecond : rest;
+  const std::int64_t sec = ns / kNanosecondsPerSecond - (rest < 0 ? 1 : 0);
   if (sec < std::numeric_limits<std::int32_t>::min() ||
       sec > std::numeric_limits<std::int32_t>::max()) {
     return fail(ErrorCode::kInvalidArgument, "a stamp of {} s is beyond the 32 bits of a ROS stamp",
