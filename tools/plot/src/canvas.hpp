@@ -29,12 +29,14 @@ struct Anchor {
   double y = 0.5;
 };
 
+// NOLINTBEGIN(readability-magic-numbers): each default is named by its member
 struct TextStyle {
   double size_px = 13;
   bool bold = false;
   bool upwards = false;  ///< turned to be read from bottom to top
   Color color{.red = 0.15, .green = 0.15, .blue = 0.15};
 };
+// NOLINTEND(readability-magic-numbers)
 
 struct Stroke {
   Color color;

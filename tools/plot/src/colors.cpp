@@ -10,6 +10,7 @@
 namespace geoflow::tools {
 namespace {
 
+// NOLINTBEGIN(modernize-use-std-numbers): a share of blue that is near one of them by chance
 constexpr std::array<Color, 7> kAnchors{{{.red = 0.050, .green = 0.030, .blue = 0.528},
                                          {.red = 0.306, .green = 0.010, .blue = 0.640},
                                          {.red = 0.513, .green = 0.038, .blue = 0.650},
@@ -17,6 +18,7 @@ constexpr std::array<Color, 7> kAnchors{{{.red = 0.050, .green = 0.030, .blue = 
                                          {.red = 0.831, .green = 0.321, .blue = 0.438},
                                          {.red = 0.933, .green = 0.486, .blue = 0.316},
                                          {.red = 0.988, .green = 0.710, .blue = 0.170}}};
+// NOLINTEND(modernize-use-std-numbers)
 
 }  // namespace
 

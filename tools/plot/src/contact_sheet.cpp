@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <utility>
 #include <vector>
 
 #include "geoflow/hal/image.hpp"
@@ -49,6 +48,28 @@ Color color_at(const FrameRef& image, int x, int y, const SheetOptions& options)
   }
 }
 
+/// Pixels of an image, right and bottom not included.
+struct Area {
+  int left;
+  int top;
+  int right;
+  int bottom;
+};
+
+Color mean_color(const FrameRef& image, const Area& area, const SheetOptions& options) {
+  Color sum;
+  for (int v = area.top; v < area.bottom; ++v) {
+    for (int u = area.left; u < area.right; ++u) {
+      const Color one = color_at(image, u, v, options);
+      sum.red += one.red;
+      sum.green += one.green;
+      sum.blue += one.blue;
+    }
+  }
+  const double count = (area.right - area.left) * (area.bottom - area.top);
+  return {.red = sum.red / count, .green = sum.green / count, .blue = sum.blue / count};
+}
+
 /// The image at the tile's width, each pixel the mean of what it covers; depth, which has no mean
 /// over an edge, the pixel in the middle.
 std::vector<Color> scaled(const FrameRef& image, int width, int height,
@@ -63,18 +84,8 @@ std::vector<Color> scaled(const FrameRef& image, int width, int height,
       const int top = y * shape.height / height;
       const int right = depth ? left + 1 : std::max(left + 1, (x + 1) * shape.width / width);
       const int bottom = depth ? top + 1 : std::max(top + 1, (y + 1) * shape.height / height);
-      Color sum;
-      for (int v = top; v < bottom; ++v) {
-        for (int u = left; u < right; ++u) {
-          const Color one = color_at(image, u, v, options);
-          sum.red += one.red;
-          sum.green += one.green;
-          sum.blue += one.blue;
-        }
-      }
-      const double count = (right - left) * (bottom - top);
       pixels.push_back(
-          {.red = sum.red / count, .green = sum.green / count, .blue = sum.blue / count});
+          mean_color(image, {.left = left, .top = top, .right = right, .bottom = bottom}, options));
     }
   }
   return pixels;
@@ -116,8 +127,10 @@ Result<void> save_contact_sheet(const std::vector<SheetImage>& images, const She
       .and_then([&](Canvas&& canvas) {
         for (int i = 0; i < static_cast<int>(images.size()); ++i) {
           const SheetImage& one = images[static_cast<std::size_t>(i)];
-          const double x = kGap + (i % columns) * step_x;
-          const double y = kGap + static_cast<double>(i / columns) * step_y;
+          const int column = i % columns;
+          const int row = i / columns;
+          const double x = kGap + column * step_x;
+          const double y = kGap + row * step_y;
           const ImageShape& shape = one.image.shape();
           const int height = std::max(1, options.tile_width_px * shape.height / shape.width);
           canvas.pixels(x, y, options.tile_width_px,

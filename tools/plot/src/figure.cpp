@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
-#include <utility>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/plot.hpp"
@@ -49,10 +48,12 @@ void draw(Canvas& canvas, const Figure& figure) {
   const double height = (figure.height_px - top - kMargin) / static_cast<double>(rows);
   for (std::size_t i = 0; i < figure.axes.size(); ++i) {
     const auto column = static_cast<double>(i % columns);
-    const auto row = static_cast<double>(i / columns);
-    draw_axes(
-        canvas, figure.axes[i],
-        {.x = kMargin + column * width, .y = top + row * height, .width = width, .height = height});
+    const std::size_t row = i / columns;
+    draw_axes(canvas, figure.axes[i],
+              {.x = kMargin + column * width,
+               .y = top + static_cast<double>(row) * height,
+               .width = width,
+               .height = height});
   }
 }
 

@@ -79,7 +79,8 @@ void draw_legend(Canvas& canvas, const Axes& axes, const Mapping& mapping) {
   if (entries.empty()) {
     return;
   }
-  const double width = kSample + label_width + 3.0 * kGap;
+  constexpr double kGaps = 3;  // before, between and after sample and label
+  const double width = kSample + label_width + kGaps * kGap;
   const double height = kLine * static_cast<double>(entries.size()) + kGap;
   const Box place = best_place(width, height, axes, mapping);
   canvas.fill(place, {.red = 1, .green = 1, .blue = 1}, kOpacity);

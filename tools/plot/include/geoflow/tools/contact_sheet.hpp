@@ -16,12 +16,14 @@ struct SheetImage {
   std::string caption;
 };
 
+// NOLINTBEGIN(readability-magic-numbers): each default is named by its member
 struct SheetOptions {
   int columns = 4;
   int tile_width_px = 320;
   double depth_unit_m = 1e-3;  ///< of kDepth16
   double depth_range_m = 6;  ///< at which depth has the last colour; what was not measured is black
 };
+// NOLINTEND(readability-magic-numbers)
 
 /// Draws the pictures row by row, each with its caption below, depth in colours. The ending of
 /// `path` decides: .png or .svg. Thread-safe. Errors: as save_figure(), an empty or YUYV image, an

@@ -34,6 +34,7 @@ struct Series {
   std::vector<double> x;
   std::vector<double> y;  ///< as many as x
   Color color = kSeriesColors[0];
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double width_px = 1.6;
   bool dashed = false;
   /// As many as x, or empty: each piece of the line is coloured by its value on the axes' colour
@@ -57,8 +58,10 @@ struct Figure {
   std::string title;
   std::string subtitle{};  ///< smaller, below the title
   int columns = 2;
+  // NOLINTBEGIN(readability-magic-numbers): named by the members
   int width_px = 1400;
   int height_px = 1050;
+  // NOLINTEND(readability-magic-numbers)
   std::vector<Axes> axes{};
 };
 
