@@ -3,6 +3,7 @@
 #include <optional>
 #include <string_view>
 
+#include "geoflow/tools/evaluate/alignment.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 

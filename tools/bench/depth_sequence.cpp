@@ -30,9 +30,8 @@ const StampedPose* pose_at(const Trajectory& poses, HostTime t) {
   const auto distance = [&](const StampedPose& pose) {
     return pose.t < t ? t - pose.t : pose.t - t;
   };
-  const auto nearest = std::min_element(
-      poses.begin(), poses.end(),
-      [&](const StampedPose& a, const StampedPose& b) { return distance(a) < distance(b); });
+  const auto nearest = std::ranges::min_element(
+      poses, [&](const StampedPose& a, const StampedPose& b) { return distance(a) < distance(b); });
   return nearest != poses.end() && distance(*nearest) <= kTimeTolerance ? &*nearest : nullptr;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,7 +15,6 @@
 #include <pcl/point_types.h>
 #include <pcl/registration/gicp.h>
 #include <tbb/global_control.h>
-#include <time.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
@@ -209,13 +209,14 @@ class Account {
 
 Result<std::vector<GicpBenchmarkRow>> run_gicp_benchmark(const GicpBenchmarkOptions& options) {
   if (options.pairs < 1 || options.steps.empty() ||
-      std::any_of(options.steps.begin(), options.steps.end(), [](int s) { return s < 1; })) {
+      std::ranges::any_of(options.steps, [](int s) { return s < 1; })) {
     return fail(ErrorCode::kInvalidArgument,
                 "gicp benchmark: at least one pair and steps of at least 1 are needed");
   }
-  const int longest = *std::max_element(options.steps.begin(), options.steps.end());
-  const auto sequence = read_depth_sequence(options.recording, options.reference,
-                                            static_cast<std::size_t>(options.pairs + longest));
+  const int longest = *std::ranges::max_element(options.steps);
+  const std::size_t needed =
+      static_cast<std::size_t>(options.pairs) + static_cast<std::size_t>(longest);
+  const auto sequence = read_depth_sequence(options.recording, options.reference, needed);
   if (!sequence) {
     return tl::unexpected{sequence.error()};
   }
@@ -231,7 +232,9 @@ Result<std::vector<GicpBenchmarkRow>> run_gicp_benchmark(const GicpBenchmarkOpti
     return tl::unexpected{grid.error()};
   }
   const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
-  OwnEngine own{*grid, {sequence->calibration.depth_unit_m, sequence->calibration.depth_alignment}};
+  OwnEngine own{*grid,
+                {.unit_m = sequence->calibration.depth_unit_m,
+                 .alignment = sequence->calibration.depth_alignment}};
   PclEngine pcl{sequence->calibration, options};
   std::vector<GicpBenchmarkRow> rows;
   for (const int step : options.steps) {
@@ -239,7 +242,7 @@ Result<std::vector<GicpBenchmarkRow>> run_gicp_benchmark(const GicpBenchmarkOpti
     Account pcl_account;
     for (int i = 0; i < std::min(options.pairs, frames - step); ++i) {
       const auto a = static_cast<std::size_t>(i);
-      const auto b = static_cast<std::size_t>(i + step);
+      const std::size_t b = a + static_cast<std::size_t>(step);
       const SE3 T_reference = sequence->T_world_cam[a].inverse() * sequence->T_world_cam[b];
       own_account.add(own.align(sequence->depth[b], sequence->depth[a]), T_reference);
       pcl_account.add(pcl.align(sequence->depth[b], sequence->depth[a]), T_reference);

@@ -10,6 +10,7 @@
 /// Frame-to-frame registration of depth images: this project's GICP beside PCL's.
 namespace geoflow::tools {
 
+// NOLINTBEGIN(readability-magic-numbers): each default is named by its member
 struct GicpBenchmarkOptions {
   std::filesystem::path recording;  ///< with depth, and a reference trajectory
   std::optional<std::filesystem::path>
@@ -20,6 +21,7 @@ struct GicpBenchmarkOptions {
   double max_distance_m = 0.1;         ///< PCL's maximum correspondence distance
   int neighbours = 20;                 ///< PCL's neighbours for a covariance
 };
+// NOLINTEND(readability-magic-numbers)
 
 /// One engine over one step. Times are CPU time of the one thread that it runs on; both engines
 /// take turns on each pair.

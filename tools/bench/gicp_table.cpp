@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include <tl/expected.hpp>

@@ -4,9 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <ios>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,7 +15,6 @@
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
@@ -31,6 +28,10 @@
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
+#include "bench/suite/ablation.hpp"
+#include "bench/suite/outcome.hpp"
+#include "bench/suite/plan.hpp"
+#include "bench/suite/sequences.hpp"
 #include "bench/suite/simulated.hpp"
 
 namespace geoflow::tools {
@@ -149,7 +150,11 @@ Result<AblationRows> TableCommand::chosen_rows() const {
 }
 
 Result<TableCommand::Job> TableCommand::make_job() const {
-  Job job{.suite = *suite_of(suite_), .rows = {}, .sequences = {}, .runs = {}, .output = output_};
+  const std::optional<Suite> suite = suite_of(suite_);
+  if (!suite) {
+    return fail(ErrorCode::kInvalidArgument, "--suite: \"{}\" is none", suite_);
+  }
+  Job job{.suite = *suite, .rows = {}, .sequences = {}, .runs = {}, .output = output_};
   if (job.output.empty()) {
     job.output = fs::path{"out"} / ("table-" + suite_);
   }
@@ -313,12 +318,11 @@ Result<void> TableCommand::publish(const Job& job, const std::vector<Outcome>& o
   }
   console.line("{}", text);
   constexpr int kIndent = 2;
-  const std::pair<const char*, std::string> files[] = {
-      // NOLINT(modernize-avoid-c-arrays): a list of two columns
-      {"table.md", text},
-      {"sequences.csv", to_csv(sequences)},
-      {"summary.csv", to_csv(summary)},
-      {"table.json", object.dump(kIndent) + "\n"}};
+  // NOLINTNEXTLINE(modernize-avoid-c-arrays): a list of two columns
+  const std::pair<const char*, std::string> files[] = {{"table.md", text},
+                                                       {"sequences.csv", to_csv(sequences)},
+                                                       {"summary.csv", to_csv(summary)},
+                                                       {"table.json", object.dump(kIndent) + "\n"}};
   for (const auto& [name, content] : files) {
     if (auto written = write_text(job.output / name, content); !written) {
       return written;

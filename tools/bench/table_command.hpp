@@ -48,6 +48,7 @@ class TableCommand {
   std::vector<std::string> settings_;
   std::string seeds_;
   std::vector<std::string> scenes_;
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double duration_s_ = 60;
   std::size_t jobs_ = 0;
   double correct_within_m_ = JudgeOptions{}.correct_within_m;

@@ -3,13 +3,11 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
 #include <nlohmann/json.hpp>
-#include <tl/expected.hpp>
 
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/result.hpp"
@@ -129,6 +127,7 @@ class BenchVerb final : public Verb {
   std::string calibration_;
   std::string reference_;
   int runs_ = 3;
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   int pairs_ = 100;
   bool csv_ = false;
 };

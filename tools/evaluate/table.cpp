@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"

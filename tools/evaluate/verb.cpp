@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>

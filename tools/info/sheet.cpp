@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <fmt/core.h>
-#include <tl/expected.hpp>
 
 #include "geoflow/drivers/faults.hpp"
 #include "geoflow/drivers/recording.hpp"

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <CLI/App.hpp>
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <ios>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -153,8 +154,8 @@ class PoseVerb final : public Verb {
       if (const auto* pose = std::get_if<ReceivedPose>(&*received)) {
         show(*pose, console);
         if (daemon::has_pose(static_cast<TrackingStatus>(pose->pose.status))) {
-          trajectory << format_tum_line({HostTime{Duration{pose->pose.t_recording_ns}},
-                                         map_from_base(pose->pose)})
+          trajectory << format_tum_line({.t = HostTime{Duration{pose->pose.t_recording_ns}},
+                                         .pose = map_from_base(pose->pose)})
                      << '\n';
         }
         if (++shown == wanted) {

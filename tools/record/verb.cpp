@@ -1,6 +1,5 @@
 #include "geoflow/tools/verb.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -10,7 +9,6 @@
 #include <utility>
 
 #include <CLI/App.hpp>
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
@@ -107,7 +105,7 @@ class RecordVerb final : public Verb {
     console.end_progress();
     auto closed = (*writer)->close();
     if (!counts || !closed) {
-      return tl::unexpected{counts ? std::move(closed.error()) : counts.error()};
+      return tl::unexpected{counts ? closed.error() : counts.error()};
     }
     console.object({{"output", output_},
                     {"samples", counts->written},

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <ios>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -64,8 +65,8 @@ Result<void> prepare_output(const fs::path& directory) {
 Result<void> write_outputs(const fs::path& directory, const ReplayResult& result,
                            const nlohmann::json& report) {
   const Calibration& calibration = result.run.streams->calibration();
+  // NOLINTNEXTLINE(modernize-avoid-c-arrays): no copies of trajectories
   const std::pair<const char*, Trajectory> files[] = {
-      // NOLINT(modernize-avoid-c-arrays): no copies of trajectories
       {"live_base.txt", result.live_base},
       {"live_camera.txt", camera_trajectory(result.live_base, calibration)},
       {"final_base.txt", result.final_base},

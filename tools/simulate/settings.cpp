@@ -45,7 +45,7 @@ std::string did_you_mean(const std::vector<std::string_view>& names, std::string
 }  // namespace
 
 const std::vector<Preset>& presets() {
-  static const std::vector<Preset> kPresets = {
+  static const std::vector<Preset> known = {
       {.name = "pronounced-trot",
        .summary = "a fast trot that shakes and blurs, as in the paper's recordings",
        .apply =
@@ -66,7 +66,7 @@ const std::vector<Preset>& presets() {
              options.legs = simulator::exact_legs();
            }},
   };
-  return kPresets;
+  return known;
 }
 
 std::vector<KnobInfo> all_knobs() {

@@ -1,6 +1,5 @@
 #include "geoflow/tools/verb.hpp"
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -35,6 +34,7 @@
 namespace geoflow::tools {
 namespace {
 
+constexpr double kShortestS = 0.1;
 constexpr double kLongestS = 7200;
 
 constexpr std::string_view kExamples =
@@ -84,7 +84,7 @@ void SimulateVerb::declare(CLI::App& command) {
   command.add_option("--seed", seed_, "Decides the place, the walk and all noise")
       ->capture_default_str();
   command.add_option("--duration", duration_s_, "Length of the recording [s]")
-      ->check(CLI::Range(0.1, kLongestS).description(""))
+      ->check(CLI::Range(kShortestS, kLongestS).description(""))
       ->capture_default_str();
   command.add_option("--preset", presets_, "Several knobs at once, before --set; repeatable")
       ->allow_extra_args(false);

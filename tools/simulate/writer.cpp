@@ -149,7 +149,7 @@ Result<bool> write_simulation(Simulation& simulation, const WriteOptions& option
   simulator::TruthFiles truth{partial.path()};
   Fork fork{**bag, tum ? &*tum : nullptr};
   const std::size_t total = simulation.frames();
-  const auto finished = simulation.run(
+  auto finished = simulation.run(
       {.camera = fork,
        .imu = fork,
        .legs = **bag,

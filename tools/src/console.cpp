@@ -32,7 +32,7 @@ void Console::write_line(std::string_view text) {
   std::fflush(stdout);
 }
 
-void Console::object(const nlohmann::json& value) {
+void Console::object(const nlohmann::json& value) const {
   if (json_) {
     write_line(value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   }

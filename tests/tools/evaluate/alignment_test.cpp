@@ -3,12 +3,15 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <stdexcept>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/tools/evaluate/association.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
 #include "geoflow/tools/evaluate/statistics.hpp"
 

@@ -2,10 +2,12 @@
 
 #include <chrono>
 #include <initializer_list>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"

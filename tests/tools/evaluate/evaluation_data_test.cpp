@@ -1,11 +1,16 @@
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "geoflow/tools/evaluate/alignment.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
+#include "geoflow/tools/evaluate/pose_errors.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"
 

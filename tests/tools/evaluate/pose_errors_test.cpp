@@ -2,18 +2,22 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/evaluate/alignment.hpp"
+#include "geoflow/tools/evaluate/association.hpp"
 #include "geoflow/tools/evaluate/statistics.hpp"
 
 #include "scripted_pairs.hpp"

@@ -9,6 +9,9 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 

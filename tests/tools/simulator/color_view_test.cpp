@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"

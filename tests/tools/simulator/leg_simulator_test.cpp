@@ -13,6 +13,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/leg_kinematics.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
 #include "geoflow/tools/simulator/support_forces.hpp"
 #include "geoflow/tools/simulator/walk.hpp"

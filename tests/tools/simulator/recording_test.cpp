@@ -1,6 +1,7 @@
 #include "geoflow/drivers/recording.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,16 +10,26 @@
 #include <map>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <tl/expected.hpp>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/ports.hpp"
+#include "geoflow/hal/result.hpp"
+#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/tools/simulator/body_trajectory.hpp"
+#include "geoflow/tools/simulator/knob.hpp"
 #include "geoflow/tools/simulator/mount.hpp"
+#include "geoflow/tools/simulator/random_stream.hpp"
 #include "geoflow/tools/simulator/simulation.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"

@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -17,6 +16,7 @@
 #include <fmt/core.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/types.h>
 #include <sys/wait.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
@@ -55,6 +55,7 @@ Ended wait_for(pid_t id) {
 Result<Child> start(const Command& command, std::size_t index) {
   std::vector<std::string> words = command.arguments;
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) {
     argv.push_back(word.data());
   }
@@ -111,6 +112,7 @@ class Running {
   /// Waits until one has ended or a signal came; takes those that have ended out.
   void wait(std::vector<Ended>& ended) {
     std::vector<pollfd> waiting;
+    waiting.reserve(children_.size());
     for (const Child& child : children_) {
       waiting.push_back({.fd = child.readable.get(), .events = POLLIN, .revents = 0});
     }

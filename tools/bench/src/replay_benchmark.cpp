@@ -15,7 +15,6 @@
 
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
-#include <unistd.h>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"

@@ -37,7 +37,7 @@ std::string csv_cell(const BenchCell& cell) {
   if (const auto* number = std::get_if<double>(&cell)) {
     return std::isfinite(*number) ? fmt::format("{}", *number) : "";
   }
-  const std::string text = std::visit(Text{}, cell);
+  std::string text = std::visit(Text{}, cell);
   if (text.find_first_of(",\"\n") == std::string::npos) {
     return text;
   }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -12,7 +11,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -29,6 +27,7 @@
 #include "geoflow/tools/trajectory_file.hpp"
 
 #include "bench/suite/published.hpp"
+#include "bench/suite/sequences.hpp"
 
 namespace geoflow::tools {
 namespace {
@@ -111,6 +110,18 @@ void add_means(Suite suite, std::string_view set, const std::string& row,
        published != nullptr ? published->rte_m : kNone});
 }
 
+template <typename Condition>
+std::vector<const Outcome*> those_where(const std::vector<Outcome>& outcomes,
+                                        const Condition& condition) {
+  std::vector<const Outcome*> chosen;
+  for (const Outcome& outcome : outcomes) {
+    if (condition(outcome)) {
+      chosen.push_back(&outcome);
+    }
+  }
+  return chosen;
+}
+
 }  // namespace
 
 Outcome judge(const Sequence& sequence, const std::string& row, const Result<TrajectoryFile>& truth,
@@ -184,12 +195,10 @@ BenchTable summary_table(Suite suite, const std::vector<Outcome>& outcomes) {
   }
   for (const std::string_view set : {"all", "table III"}) {
     for (const std::string& row : rows) {
-      std::vector<const Outcome*> chosen;
-      for (const Outcome& outcome : outcomes) {
-        if (outcome.row == row && (set == "all" || in_table_iii(suite, outcome))) {
-          chosen.push_back(&outcome);
-        }
-      }
+      const auto counts = [&](const Outcome& outcome) {
+        return outcome.row == row && (set == "all" || in_table_iii(suite, outcome));
+      };
+      const std::vector<const Outcome*> chosen = those_where(outcomes, counts);
       if (set == "all" || (!chosen.empty() && chosen.size() == table_iii_size(to_string(suite)))) {
         add_means(suite, set, row, chosen, table);
       }

@@ -8,7 +8,20 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/bench/processes.hpp"
 
+#include "bench/suite/ablation.hpp"
+#include "bench/suite/sequences.hpp"
+
 namespace geoflow::tools {
+namespace {
+
+void append_settings(const std::vector<std::string>& settings,
+                     std::vector<std::string>& arguments) {
+  for (const std::string& setting : settings) {
+    arguments.insert(arguments.end(), {"--set", setting});
+  }
+}
+
+}  // namespace
 
 std::vector<Run> plan_runs(const std::vector<Sequence>& sequences,
                            const std::vector<AblationRow>& rows, const PlanOptions& options) {
@@ -21,11 +34,8 @@ std::vector<Run> plan_runs(const std::vector<Sequence>& sequences,
                                        .arguments = {}});
       run.arguments = {options.program.string(), "replay", sequence.recording.string(), "-o",
                        run.output.string()};
-      for (const auto* settings : {&options.settings, &row.settings}) {
-        for (const std::string& setting : *settings) {
-          run.arguments.insert(run.arguments.end(), {"--set", setting});
-        }
-      }
+      append_settings(options.settings, run.arguments);
+      append_settings(row.settings, run.arguments);
     }
   }
   return runs;

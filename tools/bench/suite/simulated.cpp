@@ -21,8 +21,9 @@ constexpr std::size_t kMostSeeds = 10'000;
 
 std::optional<std::uint64_t> whole_number(std::string_view text) {
   std::uint64_t value = 0;
-  const char* const end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, value);
+  const char* const begin = text.data();
+  const char* const end = begin + text.size();
+  const auto [stopped, error] = std::from_chars(begin, end, value);
   return error == std::errc{} && stopped == end ? std::optional{value} : std::nullopt;
 }
 

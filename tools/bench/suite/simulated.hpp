@@ -18,6 +18,7 @@ struct SimulatedOptions {
   std::filesystem::path data;     ///< each recording is SCENE-SEED in it
   std::vector<std::string> scenes;
   std::vector<std::uint64_t> seeds;
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double duration_s = 60;
 };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -70,7 +69,7 @@ Result<Similarity> umeyama(const PosePairs& pairs, bool with_scale) {
         m.variance_estimate <= floor ? "estimate" : "reference");
   }
   const Eigen::JacobiSVD<Matrix3d> svd{m.covariance, Eigen::ComputeFullU | Eigen::ComputeFullV};
-  const Vector3d d = svd.singularValues();
+  const Vector3d& d = svd.singularValues();
   // d(0) itself vanishes when the two motions are unrelated; the variances bound it from above.
   if (!(d(1) > kCollinear * std::sqrt(m.variance_estimate * m.variance_reference))) {
     return fail(

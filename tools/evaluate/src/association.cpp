@@ -1,10 +1,8 @@
 #include "geoflow/tools/evaluate/association.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <iterator>
-#include <utility>
 #include <vector>
 
 #include <tl/expected.hpp>

@@ -1,6 +1,5 @@
 #include "geoflow/tools/evaluate/evaluation.hpp"
 
-#include <cstddef>
 #include <numbers>
 #include <utility>
 #include <vector>

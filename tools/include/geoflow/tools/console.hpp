@@ -27,7 +27,7 @@ class Console {
     }
   }
   /// A result as JSON on one line (so a stream of them is NDJSON); nothing without `--json`.
-  void object(const nlohmann::json& value);
+  void object(const nlohmann::json& value) const;
 
   /// Draws or redraws the progress bar: `done` of `total` (0 where it is not known), then a short
   /// note such as a rate. Redraws only when the percentage or, without a total, ten more are done.

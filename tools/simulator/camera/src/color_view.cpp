@@ -1,6 +1,5 @@
 #include "src/color_view.hpp"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -35,6 +34,23 @@ void end_rays(const Subject& subject, const Tile& tile, int steady, RayPacket& p
     land(static_cast<unsigned>(steady), normal, normal.dot(patch.origin), packet);
   } else if (steady == SteadyTiles::kMixed) {
     subject.rays.trace(tile.valid, packet);
+  }
+}
+
+void add(const LaneColours& light, LaneColours& sum) noexcept {
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    sum[i] += light[i];
+  }
+}
+
+/// Writes share * sum to the tile's pixels in an image of that width.
+void put(const Tile& tile, const LaneColours& sum, float share, std::size_t width,
+         std::vector<Rgb>& image) {
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    if (tile.valid[i] != 0) {
+      image[static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i))] =
+          sum[i] * share;
+    }
   }
 }
 
@@ -73,16 +89,9 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
         end_rays(subject, tile, seen, packet);
         LaneColours light{};
         subject.shader.shade(tile.valid, packet, look, light);
-        for (std::size_t i = 0; i < kPacket; ++i) {
-          sum[i] += light[i];
-        }
+        add(light, sum);
       }
-      for (std::size_t i = 0; i < kPacket; ++i) {
-        if (tile.valid[i] != 0) {
-          image[static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i))] =
-              sum[i] * share;
-        }
-      }
+      put(tile, sum, share, width, image);
     };
   });
   return image;

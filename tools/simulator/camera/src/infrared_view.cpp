@@ -1,6 +1,5 @@
 #include "src/infrared_view.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <numbers>
 #include <vector>

@@ -13,6 +13,7 @@
 
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/ray_scene.hpp"
 
@@ -60,10 +61,10 @@ Rgb lamp_light(const AreaLight& lamp, const RayScene& rays, const Vector3f& poin
   }
   float sum = 0;
   for (int i = 0; i < kLightSamples * kLightSamples; ++i) {
-    const float u =
-        (static_cast<float>(i % kLightSamples) + 0.5F) / static_cast<float>(kLightSamples);
-    const float v =
-        (static_cast<float>(i / kLightSamples) + 0.5F) / static_cast<float>(kLightSamples);
+    const int column = i % kLightSamples;
+    const int row = i / kLightSamples;
+    const float u = (static_cast<float>(column) + 0.5F) / static_cast<float>(kLightSamples);
+    const float v = (static_cast<float>(row) + 0.5F) / static_cast<float>(kLightSamples);
     const Vector3f at = lamp.corner + u * lamp.edge_u + v * lamp.edge_v;
     const Vector3f way = at - point;
     const float squared = way.squaredNorm();

@@ -89,7 +89,7 @@ void attach(RTCScene scene, RTCGeometry geometry, HitKind kind) {
 }
 
 void intersect(RTCScene scene, const Valid& valid, RayPacket& packet) {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   // Embree reads both as whole vectors.
@@ -235,7 +235,7 @@ void RayScene::trace_static(const Valid& valid, RayPacket& packet) const {
 }
 
 bool RayScene::blocked(const Vector3f& from, const Vector3f& to) const {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   const float distance = (to - from).norm();
   const Vector3f direction = (to - from) / distance;

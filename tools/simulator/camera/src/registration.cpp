@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
-#include "geoflow/hal/geometry.hpp"
 
 #include "src/view.hpp"
 
@@ -23,10 +22,10 @@ using Eigen::Vector3f;
 struct Projection {
   View ir;  // in the colour camera's frame
   Pinhole pinhole;
-  float fx;
-  float fy;
-  float cx;
-  float cy;
+  float fx = 0;
+  float fy = 0;
+  float cx = 0;
+  float cy = 0;
 
   [[nodiscard]] Vector3f point(float x, float y, float depth_m) const {
     return ir.R_world_cam * (depth_m * pinhole.direction(x, y)) + ir.p_world_cam;
@@ -35,6 +34,33 @@ struct Projection {
     return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy};
   }
 };
+
+/// The pixel that a place in an image lies in; pixel 0 reaches from -0.5 to 0.5.
+int pixel_at(float place) {
+  const float from_edge = place + 0.5F;
+  return static_cast<int>(from_edge);
+}
+
+/// Pixels of an image, the last ones included.
+struct Patch {
+  int left;
+  int top;
+  int right;
+  int bottom;
+};
+
+/// Leaves in each pixel of the patch the nearest depth; 0 is none.
+void fill_nearest(const Patch& patch, std::uint16_t depth_mm, int width,
+                  std::span<std::uint16_t> out_mm) {
+  for (int row = patch.top; row <= patch.bottom; ++row) {
+    for (int column = patch.left; column <= patch.right; ++column) {
+      std::uint16_t& pixel =
+          out_mm[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                 static_cast<std::size_t>(column)];
+      pixel = pixel == 0 ? depth_mm : std::min(pixel, depth_mm);
+    }
+  }
+}
 
 }  // namespace
 
@@ -65,19 +91,11 @@ void align_to_color(const std::vector<float>& depth_m, const Registration& regis
       }
       const Vector2f low = projection.pixel(projection.point(at_x - 0.5F, at_y - 0.5F, depth));
       const Vector2f high = projection.pixel(projection.point(at_x + 0.5F, at_y + 0.5F, depth));
-      const int left = std::max(0, static_cast<int>(low.x() + 0.5F));
-      const int top = std::max(0, static_cast<int>(low.y() + 0.5F));
-      const int right = std::min(color.width - 1, static_cast<int>(high.x() + 0.5F));
-      const int bottom = std::min(color.height - 1, static_cast<int>(high.y() + 0.5F));
-      for (int row = top; row <= bottom; ++row) {
-        for (int column = left; column <= right; ++column) {
-          std::uint16_t& pixel =
-              out_mm[static_cast<std::size_t>(row) * static_cast<std::size_t>(color.width) +
-                     static_cast<std::size_t>(column)];
-          const auto value = static_cast<std::uint16_t>(millimetres);
-          pixel = pixel == 0 ? value : std::min(pixel, value);
-        }
-      }
+      fill_nearest({.left = std::max(0, pixel_at(low.x())),
+                    .top = std::max(0, pixel_at(low.y())),
+                    .right = std::min(color.width - 1, pixel_at(high.x())),
+                    .bottom = std::min(color.height - 1, pixel_at(high.y()))},
+                   static_cast<std::uint16_t>(millimetres), color.width, out_mm);
     }
   }
 }

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 
@@ -92,7 +91,7 @@ void Sender::aim_tile(const Tile& tile, const PixelBits& pixels, int part, const
     const int parts = sampling_.rays_a_pixel;
     const float inverse_parts = 1.0F / static_cast<float>(parts);
     const auto exposure_s = static_cast<float>(shutter_.exposure_s);
-    const float row_s = static_cast<float>(shutter_.readout_s / shutter_.rows);
+    const auto row_s = static_cast<float>(shutter_.readout_s / shutter_.rows);
     const Eigen::Matrix3f from = leg.begin.R_world_cam;
     const Eigen::Matrix3f turn = leg.change.R_world_cam;
     const Vector3f origin = leg.begin.p_world_cam;

@@ -47,8 +47,8 @@ class Curve {
     }
   }
   [[nodiscard]] std::uint8_t operator()(float linear) const noexcept {
-    return codes_[static_cast<std::size_t>(
-        std::clamp(linear, 0.0F, 1.0F) * static_cast<float>(kSteps - 1) + 0.5F)];
+    const float from_edge = std::clamp(linear, 0.0F, 1.0F) * static_cast<float>(kSteps - 1) + 0.5F;
+    return codes_[static_cast<std::size_t>(from_edge)];
   }
 
  private:
@@ -69,8 +69,7 @@ struct Pixel {
   float noise_scale;
 
   /// `bits`: of this pixel.
-  [[nodiscard, gnu::always_inline]] inline Rgb read(const Rgb& light,
-                                                    std::uint32_t bits) const noexcept {
+  [[nodiscard, gnu::always_inline]] Rgb read(const Rgb& light, std::uint32_t bits) const noexcept {
     constexpr auto kReadVariance = static_cast<float>(kReadNoise * kReadNoise);
     const Rgb signal = light * electrons_per_nit;
     std::array<float, 4> noise{};
@@ -85,6 +84,18 @@ struct Pixel {
  private:
   static constexpr std::uint32_t kChannelStep = 0x9e3779b9U;  // 2^32 over the golden ratio
 };
+
+/// Writes pixel i of an image that is grey, or blue, green and red.
+[[gnu::always_inline]] inline void write(const Curve& curve, const Rgb& value, bool grey,
+                                         std::size_t i, std::span<std::byte> image) {
+  if (grey) {
+    image[i] = static_cast<std::byte>(curve(luminance(value)));
+    return;
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    image[3 * i + c] = static_cast<std::byte>(curve(value[2 - c]));
+  }
+}
 
 }  // namespace
 
@@ -113,13 +124,7 @@ FrameRef develop(const std::vector<Rgb>& luminance_nit, const Exposure& exposure
       for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
         const Rgb value =
             pixel.read(luminance_nit[i], scramble32(row_key + static_cast<std::uint32_t>(i)));
-        if (grey) {
-          bytes[i] = static_cast<std::byte>(curve(luminance(value)));
-        } else {
-          for (std::size_t c = 0; c < 3; ++c) {
-            bytes[3 * i + c] = static_cast<std::byte>(curve(value[2 - c]));
-          }
-        }
+        write(curve, value, grey, i, bytes);
       }
     });
   });

@@ -16,7 +16,8 @@ SmoothNoise::Weights SmoothNoise::weights(float position) noexcept {
   const float cell = std::floor(position);
   const float t = position - cell;
   const float s = 1.0F - t;
-  // The uniform cubic B-spline: each side's outer and inner weight.
+  // Each side's outer and inner weight.
+  // NOLINTNEXTLINE(readability-magic-numbers): the uniform cubic B-spline
   const auto inner = [](float u) { return kSixth * (kFour - 6.0F * u * u + 3.0F * u * u * u); };
   Weights result{.first = static_cast<std::size_t>(cell),
                  .weight = {kSixth * s * s * s, inner(t), inner(s), kSixth * t * t * t}};
@@ -29,7 +30,7 @@ SmoothNoise::Weights SmoothNoise::weights(float position) noexcept {
 }
 
 SmoothNoise::SmoothNoise(std::uint64_t key, int width, float pitch_x, float pitch_y)
-    : key_{key}, pitch_y_{pitch_y}, columns_{0} {
+    : key_{key}, pitch_y_{pitch_y} {
   for (int x = 0; x < width; ++x) {
     pixels_.push_back(weights(static_cast<float>(x) / pitch_x));
     columns_ = std::max(columns_, pixels_.back().first + 4);

@@ -21,7 +21,7 @@ class SmoothNoise {
  private:
   std::uint64_t key_;
   float pitch_y_;
-  std::size_t columns_;
+  std::size_t columns_ = 0;
   /// For each pixel of a row: the first of four columns, their weights, and one over the
   /// root of the sum of the weights' squares.
   struct Weights {

@@ -9,7 +9,7 @@
 namespace geoflow::simulator {
 
 inline constexpr int kTile = 4;  ///< a packet's rays are those of kTile x kTile pixels
-static_assert(kTile * kTile == kPacket);
+static_assert(std::size_t{kTile} * kTile == kPacket);
 
 /// One tile of an image: pixel (x, y) of lane i is (left + i % kTile, top + i / kTile) where
 /// valid[i] is -1.

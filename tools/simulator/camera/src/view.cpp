@@ -10,20 +10,21 @@ namespace geoflow::simulator {
 namespace {
 
 constexpr double kStep_s = 1e-3;
-constexpr double kMostSteps = 250;
+constexpr int kMostSteps = 250;
 
 }  // namespace
 
 ViewTrack::ViewTrack(double begin_s, double end_s, const PoseAt& T_world_cam) : begin_s_{begin_s} {
-  const double steps = std::clamp(std::ceil((end_s - begin_s) / kStep_s), 1.0, kMostSteps);
+  const int steps =
+      static_cast<int>(std::clamp<double>(std::ceil((end_s - begin_s) / kStep_s), 1, kMostSteps));
   step_s_ = (end_s - begin_s) / steps;
-  for (double step = 0; step <= steps; ++step) {
+  for (int step = 0; step <= steps; ++step) {
     views_.emplace_back(T_world_cam(begin_s + step * step_s_));
   }
 }
 
 View ViewTrack::at(double t_s) const {
-  const double last = static_cast<double>(views_.size() - 1);
+  const auto last = static_cast<double>(views_.size() - 1);
   const double place = step_s_ > 0 ? std::clamp((t_s - begin_s_) / step_s_, 0.0, last) : 0.0;
   const auto index = std::min(static_cast<std::size_t>(place), views_.size() - 2);
   const auto share = static_cast<float>(place - static_cast<double>(index));

@@ -146,9 +146,11 @@ class Simulation::Implementation {
     const RecordingOptions& recording = options_.recording;
     const double duration_s = options_.duration_s;
     const double readout_s = (options_.camera.exposure_max_s + options_.camera.readout_s) / 2;
-    const Delay camera{recording.camera_latency_s, recording.camera_jitter_s};
-    const Delay legs{recording.leg_latency_s, recording.leg_jitter_s};
+    const Delay camera{.latency_s = recording.camera_latency_s,
+                       .jitter_s = recording.camera_jitter_s};
+    const Delay legs{.latency_s = recording.leg_latency_s, .jitter_s = recording.leg_jitter_s};
     std::vector<HostTime> imu_times;
+    imu_times.reserve(imu_.size());
     for (const ImuReading& reading : imu_) {
       imu_times.push_back(host_time(reading.t_s));
     }
@@ -158,14 +160,20 @@ class Simulation::Implementation {
       plan_arrivals(stream, RandomStream{options_.seed, name}, all);
     };
     std::vector<PlannedArrival> all;
-    add({SampleKind::kImu, {recording.imu_latency_s, recording.imu_jitter_s}, imu_times},
+    add({.kind = SampleKind::kImu,
+         .delay = {.latency_s = recording.imu_latency_s, .jitter_s = recording.imu_jitter_s},
+         .measured = imu_times},
         "arrival.imu", all);
-    add({SampleKind::kLegs, legs, sample_times(options_.legs.rate_hz, duration_s)}, "arrival.legs",
-        all);
-    add({SampleKind::kOdometry, legs, sample_times(recording.odometry_rate_hz, duration_s)},
+    add({.kind = SampleKind::kLegs,
+         .delay = legs,
+         .measured = sample_times(options_.legs.rate_hz, duration_s)},
+        "arrival.legs", all);
+    add({.kind = SampleKind::kOdometry,
+         .delay = legs,
+         .measured = sample_times(recording.odometry_rate_hz, duration_s)},
         "arrival.odometry", all);
-    add({SampleKind::kColor, camera, images}, "arrival.color", all);
-    add({SampleKind::kDepth, camera, images}, "arrival.depth", all);
+    add({.kind = SampleKind::kColor, .delay = camera, .measured = images}, "arrival.color", all);
+    add({.kind = SampleKind::kDepth, .delay = camera, .measured = images}, "arrival.depth", all);
     std::ranges::sort(all);
     return all;
   }

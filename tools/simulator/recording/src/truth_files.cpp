@@ -1,6 +1,5 @@
 #include "geoflow/tools/simulator/truth_files.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <ios>
@@ -12,7 +11,6 @@
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
-#include "geoflow/hal/samples.hpp"
 #include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/simulation.hpp"
 #include "geoflow/tools/trajectory_file.hpp"

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <numbers>
 #include <span>
-#include <utility>
 
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"

@@ -10,7 +10,6 @@
 
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
-#include "geoflow/tools/simulator/texture.hpp"
 
 namespace geoflow::simulator {
 namespace {
@@ -98,7 +97,7 @@ void Canvas::rectangle(float x, float y, float width, float height, const Rgb& c
 }
 
 void Canvas::disc(float x, float y, float radius, const Rgb& colour) {
-  const float side = static_cast<float>(side_);
+  const auto side = static_cast<float>(side_);
   const int reach = static_cast<int>(std::ceil(radius * side));
   const int cx = static_cast<int>(x * side);
   const int cy = static_cast<int>(y * side);

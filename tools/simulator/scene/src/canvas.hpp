@@ -31,6 +31,7 @@ class Canvas {
   struct Noise {
     int cells = 4;
     int octaves = 4;
+    // NOLINTNEXTLINE(readability-magic-numbers): named by its member
     float amplitude = 0.1F;
     int stretch = 1;
   };

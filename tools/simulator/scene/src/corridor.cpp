@@ -6,6 +6,7 @@
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/furniture.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
@@ -72,7 +73,7 @@ void lay_out_corridor(Builder builder, Random random) {
     leg.quad({0, 0, height}, y, x, ceiling);
     add_ceiling_lamps(leg, size, {.lux = 220, .spacing_m = {4, 4}, .size_m = {0.6F, 0.6F}});
   }
-  const double centre = static_cast<double>(0.5F * width);
+  const auto centre = static_cast<double>(0.5F * width);
   const double corner_x = static_cast<double>(first) - centre;
   builder.scene().waypoints = {
       {1.2, centre}, {corner_x, centre}, {corner_x, static_cast<double>(second) - 1.2}};

@@ -1,7 +1,6 @@
 #include "src/furniture.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -10,6 +9,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/painters.hpp"
 
 // Furniture is its measures in metres. NOLINTBEGIN(readability-magic-numbers)

@@ -8,6 +8,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/furniture.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
@@ -55,7 +56,7 @@ void furnish_living_room(Builder builder, const Vector2f& size, const FurnitureM
   const Vector3f middle{0.5F * size.x(), 0.5F * size.y(), 0};
   builder.quad(middle + Vector3f{-0.95F, -0.7F, 0.008F}, {1.9F, 0, 0}, {0, 1.4F, 0}, rug);
   add_table(builder.at(middle), {0.9F, 0.5F, 0.42F}, m);
-  Builder west = wall_of(builder, walls, Side::kWest);
+  const Builder west = wall_of(builder, walls, Side::kWest);
   add_sofa(west.at({0.5F * size.y() - 0.95F, -0.04F, 0}), 1.9F, m);
   add_poster(west, {0.5F * size.y() - 0.5F, 0, 1.2F}, 1.0F, random.fork("painting"));
   Builder south = wall_of(builder, walls, Side::kSouth);
@@ -68,7 +69,7 @@ void furnish_living_room(Builder builder, const Vector2f& size, const FurnitureM
 }
 
 /// Counters along two walls, a table with chairs in the middle.
-void furnish_kitchen(Builder builder, const Vector2f& size, const FurnitureMaterials& m,
+void furnish_kitchen(const Builder& builder, const Vector2f& size, const FurnitureMaterials& m,
                      Random random) {
   const Room walls{.size_m = {size.x(), size.y(), kHeight_m}};
   Builder east = wall_of(builder, walls, Side::kEast);
@@ -81,7 +82,7 @@ void furnish_kitchen(Builder builder, const Vector2f& size, const FurnitureMater
   Builder south = wall_of(builder, walls, Side::kSouth);
   south.box({0.7F, -0.62F, 0}, {1.35F, 0, 1.8F}, m.metal);
   add_poster(south, {size.x() - 1.4F, 0, 1.1F}, 0.7F, random.fork("calendar"));
-  Builder table = builder.at({0.5F * size.x() - 0.2F, 0.5F * size.y(), 0});
+  const Builder table = builder.at({0.5F * size.x() - 0.2F, 0.5F * size.y(), 0});
   add_table(table, {0.8F, 0.8F, 0.74F}, m);
   constexpr float kQuarter = 0.5F * std::numbers::pi_v<float>;
   for (int side = 0; side < 4; ++side) {
@@ -94,7 +95,7 @@ void furnish_kitchen(Builder builder, const Vector2f& size, const FurnitureMater
 }
 
 /// Along the hall's outer wall: shoes, a chest, pictures, coats.
-void furnish_hall(Builder builder, const Vector2f& size, const FurnitureMaterials& m,
+void furnish_hall(const Builder& builder, const Vector2f& size, const FurnitureMaterials& m,
                   Random random) {
   const Room walls{.size_m = {size.x(), size.y(), kHeight_m}};
   Builder north = wall_of(builder, walls, Side::kNorth);
@@ -135,7 +136,7 @@ struct Doors {
   float between;
 };
 
-void light_rooms(Builder builder, const Plan& plan) {
+void light_rooms(const Builder& builder, const Plan& plan) {
   const auto& [living_x, kitchen_x, rooms_y, hall_y] = plan;
   for (const auto& [corner, size] :
        {std::pair{Vector3f{0, 0, 0}, Vector3f{living_x, rooms_y, kHeight_m}},
@@ -149,7 +150,7 @@ void light_rooms(Builder builder, const Plan& plan) {
   }
 }
 
-void walk_round(Builder builder, const Plan& plan, const Doors& doors) {
+void walk_round(const Builder& builder, const Plan& plan, const Doors& doors) {
   // Round: hall, living room, kitchen, hall.
   const auto point = [](float x, float y) {
     return Vector2d{static_cast<double>(x), static_cast<double>(y)};
@@ -211,7 +212,7 @@ void lay_out_home(Builder builder, Random random) {
   constexpr float kQuarter = 0.5F * std::numbers::pi_v<float>;
   add_partition(builder.at({0, rooms_y, 0}), total_x, {living_door, kitchen_door}, wall, m.white);
   const float between = 0.5F * rooms_y + 0.2F;
-  Builder upright = builder.at({living_x, 0, 0}, kQuarter);
+  const Builder upright = builder.at({living_x, 0, 0}, kQuarter);
   add_partition(upright, rooms_y, {between}, wall, m.white);
 
   furnish_living_room(builder, {living_x, rooms_y}, m, random.fork("living room"));

@@ -6,6 +6,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/furniture.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
@@ -23,12 +24,12 @@ constexpr float kWallZone_m = 0.65F;  // furniture along the walls
 
 /// `count` pairs of desks back to back from the origin along x, centred on y = 0, with chairs at
 /// both sides.
-void add_desk_block(Builder builder, int count, const FurnitureMaterials& m, Random random) {
+void add_desk_block(const Builder& builder, int count, const FurnitureMaterials& m, Random random) {
   for (int i = 0; i < count; ++i) {
     for (const bool far_side : {false, true}) {
       const float x = kDesk_m * static_cast<float>(i);
-      Builder side = far_side ? builder.at({x + kDesk_m, 0, 0}, std::numbers::pi_v<float>)
-                              : builder.at({x, 0, 0});
+      const Builder side = far_side ? builder.at({x + kDesk_m, 0, 0}, std::numbers::pi_v<float>)
+                                    : builder.at({x, 0, 0});
       add_desk(side, m, Random{random.bits()});
       if (random.chance(0.85F)) {
         add_office_chair(side.at({random.uniform(0.6F, 1.0F),
@@ -49,7 +50,7 @@ void furnish_wall(const Builder& wall, float length_m, const FurnitureMaterials&
     if (kind == 0) {
       add_bookshelf(wall.at({x, 0, 0}), 1.2F, m);
     } else if (kind == 1) {
-      Builder cabinet = wall.at({x, 0, 0});
+      const Builder cabinet = wall.at({x, 0, 0});
       add_cabinet(cabinet, {1.1F, 0.45F, random.uniform(0.8F, 1.3F)},
                   random.chance(0.5F) ? m.wood : m.laminate, m);
       add_poster(cabinet, {0.1F, 0, 1.4F}, 0.8F, Random{random.bits()});
@@ -113,11 +114,11 @@ void lay_out_office(Builder builder, Random random) {
   add_desk_block(builder.at({x3, middle, 0}), second, m, random.fork("second block"));
 
   // A figure of eight round both blocks.
-  const double y_low = static_cast<double>(middle - 0.5F * kBlockDepth_m - side);
-  const double y_high = static_cast<double>(middle + 0.5F * kBlockDepth_m + side);
-  const double left = static_cast<double>(x1 - kWalk_m);
-  const double centre = static_cast<double>(0.5F * (x2 + x3));
-  const double right = static_cast<double>(x4 + kWalk_m);
+  const auto y_low = static_cast<double>(middle - 0.5F * kBlockDepth_m - side);
+  const auto y_high = static_cast<double>(middle + 0.5F * kBlockDepth_m + side);
+  const auto left = static_cast<double>(x1 - kWalk_m);
+  const auto centre = static_cast<double>(0.5F * (x2 + x3));
+  const auto right = static_cast<double>(x4 + kWalk_m);
   builder.scene().waypoints = {{left, y_low},    {centre, y_low}, {centre, y_high},
                                {right, y_high},  {right, y_low},  {centre, y_low},
                                {centre, y_high}, {left, y_high},  {left, y_low}};

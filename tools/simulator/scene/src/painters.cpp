@@ -4,7 +4,6 @@
 
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
-#include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/canvas.hpp"
 
@@ -19,6 +18,16 @@ Rgb random_colour(Random& random, float darkest, float brightest) {
   const float value = random.uniform(darkest, brightest);
   return Rgb{value * random.uniform(0.3F, 1.0F), value * random.uniform(0.3F, 1.0F),
              value * random.uniform(0.3F, 1.0F), 0};
+}
+
+/// Multiplies `size` pixels from `corner` on.
+void brighten(Canvas& canvas, const Eigen::Vector2i& corner, const Eigen::Vector2i& size,
+              float brightness) {
+  for (int y = 0; y < size.y(); ++y) {
+    for (int x = 0; x < size.x(); ++x) {
+      canvas.at(corner.x() + x, corner.y() + y) *= brightness;
+    }
+  }
 }
 
 /// A paragraph: rows of dark words.
@@ -79,12 +88,8 @@ Canvas paint_planks(const Rgb& colour, int planks, Random random) {
     const float left = static_cast<float>(plank) * width;
     for (const float piece : {cut, cut + 0.5F}) {
       const float brightness = random.uniform(0.78F, 1.22F);
-      for (int y = 0; y < kFine / 2; ++y) {
-        for (int x = 0; x < kFine / planks; ++x) {
-          canvas.at(static_cast<int>(left * kFine) + x, static_cast<int>(piece * kFine) + y) *=
-              brightness;
-        }
-      }
+      brighten(canvas, {static_cast<int>(left * kFine), static_cast<int>(piece * kFine)},
+               {kFine / planks, kFine / 2}, brightness);
       canvas.rectangle(left, piece, width, 0.003F, 0.35F * colour);
     }
     canvas.rectangle(left, 0, 0.003F, 1, 0.35F * colour);
@@ -118,12 +123,8 @@ Canvas paint_tiles(const TileStyle& style, Random random) {
   for (int row = 0; row < style.count; ++row) {
     for (int column = 0; column < style.count; ++column) {
       const float brightness = 1.0F + style.variation * random.normal();
-      for (int y = 0; y < kFine / style.count; ++y) {
-        for (int x = 0; x < kFine / style.count; ++x) {
-          canvas.at(column * (kFine / style.count) + x, row * (kFine / style.count) + y) *=
-              brightness;
-        }
-      }
+      const int side = kFine / style.count;
+      brighten(canvas, {column * side, row * side}, {side, side}, brightness);
       canvas.rectangle(static_cast<float>(column) * tile, static_cast<float>(row) * tile, tile,
                        joint, style.joint);
       canvas.rectangle(static_cast<float>(column) * tile, static_cast<float>(row) * tile, joint,

@@ -21,6 +21,7 @@ struct TileStyle {
   Rgb colour{};
   Rgb joint{};
   int count = 2;
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   float joint_fraction = 0.02F;  ///< of a tile's side
   float variation = 0;
 };

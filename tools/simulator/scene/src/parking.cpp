@@ -7,6 +7,7 @@
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
 #include "src/room.hpp"
@@ -108,6 +109,11 @@ Materials make_materials(Builder& builder, Random random) {
   return m;
 }
 
+/// The place of the i-th of things that stand `step` apart.
+float along(int i, float first, float step) {
+  return first + static_cast<float>(i) * step;
+}
+
 /// Tubes along both lanes, of which some are out, and one in the middle.
 void hang_lamps(Builder builder, const Vector3f& hall_m, float lane_y, Random& random) {
   const auto hang = [&](float x, float y) {
@@ -115,9 +121,9 @@ void hang_lamps(Builder builder, const Vector3f& hall_m, float lane_y, Random& r
                  Rgb{0.95F, 1.0F, 0.88F, 0});
   };
   for (const float y : {lane_y, hall_m.y() - lane_y}) {
-    for (float x = 3.0F; x < hall_m.x(); x += 6.0F) {
+    for (int i = 0; along(i, 3.0F, 6.0F) < hall_m.x(); ++i) {
       if (random.chance(0.75F)) {
-        hang(x, y);
+        hang(along(i, 3.0F, 6.0F), y);
       }
     }
   }
@@ -145,11 +151,14 @@ void lay_out_parking(Builder builder, Random random) {
   const Room hall{
       .size_m = {length, depth, height}, .floor = floor, .wall = m.concrete, .ceiling = m.concrete};
   add_room(builder, hall);
-  for (float x = 4.0F; x < length; x += 7.5F) {
+  for (int i = 0; along(i, 4.0F, 7.5F) < length; ++i) {
+    const float x = along(i, 4.0F, 7.5F);
     builder.box({x, 0, height - 0.35F}, {x + 0.4F, depth, height}, m.concrete);
     builder.quad({x, 0, height - 0.35F}, {0, depth, 0}, {0.4F, 0, 0}, m.concrete);
   }
-  for (float y = 0.5F * kSlotDepth_m + 3.2F; y < depth; y += 7.0F) {
+  constexpr float kFirstPipe_m = 0.5F * kSlotDepth_m + 3.2F;
+  for (int i = 0; along(i, kFirstPipe_m, 7.0F) < depth; ++i) {
+    const float y = along(i, kFirstPipe_m, 7.0F);
     builder.rod({0.5F, y, height - 0.12F}, {length - 0.5F, y, height - 0.12F}, 0.06F, m.rim);
   }
   const float lane_y = kSlotDepth_m + 0.5F * kLane_m;
@@ -165,10 +174,10 @@ void lay_out_parking(Builder builder, Random random) {
   add_row(builder.at({kLane_m, 0.5F * depth, 0}), middle_slots, height, m,
           random.fork("middle south"));
 
-  const double low_x = static_cast<double>(0.5F * kLane_m);
+  const auto low_x = static_cast<double>(0.5F * kLane_m);
   const double high_x = static_cast<double>(length) - low_x;
-  const double low_y = static_cast<double>(lane_y);
-  const double high_y = static_cast<double>(depth - lane_y);
+  const auto low_y = static_cast<double>(lane_y);
+  const auto high_y = static_cast<double>(depth - lane_y);
   builder.scene().waypoints = {
       {low_x, low_y}, {high_x, low_y}, {high_x, high_y}, {low_x, high_y}, {low_x, low_y}};
   builder.scene().closed = true;

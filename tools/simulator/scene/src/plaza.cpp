@@ -6,6 +6,7 @@
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
 
@@ -137,8 +138,8 @@ void lay_out_plaza(Builder builder, Random random) {
     add_bench(builder.at(place_aside(random, half_walk), random.uniform(0.0F, 6.0F)), m);
     add_lamp_post(builder.at(place_aside(random, half_walk)), m);
   }
-  const double x = static_cast<double>(half_walk.x());
-  const double y = static_cast<double>(half_walk.y());
+  const auto x = static_cast<double>(half_walk.x());
+  const auto y = static_cast<double>(half_walk.y());
   scene.waypoints = {{-x, -y}, {x, -y}, {x, y}, {-x, y}, {-x, -y}};
   scene.closed = true;
   add_pedestrians(builder,

@@ -2,11 +2,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "geoflow/hal/nearest_name.hpp"
@@ -17,6 +17,7 @@
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/layouts.hpp"
 
 namespace geoflow::simulator {
@@ -26,27 +27,33 @@ using LayOut = void (*)(Builder, Random);
 
 template <bool Structure, bool Textured, bool Near>
 void lay_out_case(Builder builder, Random random) {
-  lay_out_structure(builder, {.structure = Structure, .texture = Textured, .near = Near}, random);
+  lay_out_structure(std::move(builder), {.structure = Structure, .texture = Textured, .near = Near},
+                    random);
 }
 
 constexpr std::array kScenes{
-    SceneInfo{"office",
-              "desks, shelves and carpet; a figure of eight round two blocks of desks (the paper's "
-              "Seq1)"},
-    SceneInfo{"corridor", "white walls, few doors, people walking by (Seq2)"},
-    SceneInfo{"parking", "underground, dark, a floor that mirrors, cars (Seq3)"},
-    SceneInfo{"plaza",
-              "sunny paving that repeats, most of all else beyond the reach of depth (Seq4)"},
-    SceneInfo{"home",
-              "living room, kitchen and hall; a round through three doors, for closing loops"},
-    SceneInfo{"str_tex_far", "folded coloured panels, 2 m away (TUM fr3 structure_texture_far)"},
-    SceneInfo{"str_tex_near", "folded coloured panels, 1 m away"},
-    SceneInfo{"str_notex_far", "folded plain panels, 2 m away"},
-    SceneInfo{"str_notex_near", "folded plain panels, 1 m away"},
-    SceneInfo{"nostr_tex_far", "a flat coloured wall, 2 m away"},
-    SceneInfo{"nostr_tex_near", "a flat coloured wall, 1 m away"},
-    SceneInfo{"nostr_notex_far", "a flat plain wall, 2 m away"},
-    SceneInfo{"nostr_notex_near", "a flat plain wall, 1 m away"},
+    SceneInfo{
+        .name = "office",
+        .summary =
+            "desks, shelves and carpet; a figure of eight round two blocks of desks (the paper's "
+            "Seq1)"},
+    SceneInfo{.name = "corridor", .summary = "white walls, few doors, people walking by (Seq2)"},
+    SceneInfo{.name = "parking", .summary = "underground, dark, a floor that mirrors, cars (Seq3)"},
+    SceneInfo{
+        .name = "plaza",
+        .summary = "sunny paving that repeats, most of all else beyond the reach of depth (Seq4)"},
+    SceneInfo{
+        .name = "home",
+        .summary = "living room, kitchen and hall; a round through three doors, for closing loops"},
+    SceneInfo{.name = "str_tex_far",
+              .summary = "folded coloured panels, 2 m away (TUM fr3 structure_texture_far)"},
+    SceneInfo{.name = "str_tex_near", .summary = "folded coloured panels, 1 m away"},
+    SceneInfo{.name = "str_notex_far", .summary = "folded plain panels, 2 m away"},
+    SceneInfo{.name = "str_notex_near", .summary = "folded plain panels, 1 m away"},
+    SceneInfo{.name = "nostr_tex_far", .summary = "a flat coloured wall, 2 m away"},
+    SceneInfo{.name = "nostr_tex_near", .summary = "a flat coloured wall, 1 m away"},
+    SceneInfo{.name = "nostr_notex_far", .summary = "a flat plain wall, 2 m away"},
+    SceneInfo{.name = "nostr_notex_near", .summary = "a flat plain wall, 1 m away"},
 };
 constexpr std::array<LayOut, kScenes.size()> kLayouts{
     lay_out_office,
@@ -66,13 +73,30 @@ constexpr std::array<LayOut, kScenes.size()> kLayouts{
 
 // NOLINTBEGIN(readability-magic-numbers): the last two of each row are its range
 constexpr std::array<Knob<SceneOptions>, 4> kKnobs{{
-    {"scene.light_level", "1", "times the scene's lights", &SceneOptions::light_level, 0.001, 100},
-    {"scene.texture_contrast", "1", "times the textures' deviation from their mean",
-     &SceneOptions::texture_contrast, 0, 3},
-    {"scene.reflectivity", "1", "times the mirror reflectance of floors, glass and cars",
-     &SceneOptions::reflectivity, 0, 10},
-    {"scene.pedestrians", "", "how many walk about; -1: as many as the scene has by itself",
-     &SceneOptions::pedestrians, -1, 20},
+    {.name = "scene.light_level",
+     .unit = "1",
+     .summary = "times the scene's lights",
+     .member = &SceneOptions::light_level,
+     .minimum = 0.001,
+     .maximum = 100},
+    {.name = "scene.texture_contrast",
+     .unit = "1",
+     .summary = "times the textures' deviation from their mean",
+     .member = &SceneOptions::texture_contrast,
+     .minimum = 0,
+     .maximum = 3},
+    {.name = "scene.reflectivity",
+     .unit = "1",
+     .summary = "times the mirror reflectance of floors, glass and cars",
+     .member = &SceneOptions::reflectivity,
+     .minimum = 0,
+     .maximum = 10},
+    {.name = "scene.pedestrians",
+     .unit = "",
+     .summary = "how many walk about; -1: as many as the scene has by itself",
+     .member = &SceneOptions::pedestrians,
+     .minimum = -1,
+     .maximum = 20},
 }};
 // NOLINTEND(readability-magic-numbers)
 
@@ -87,7 +111,7 @@ std::span<const SceneInfo> scenes() {
 }
 
 Result<Scene> make_scene(std::string_view name, std::uint64_t seed, const SceneOptions& options) {
-  const auto found = std::ranges::find(kScenes, name, &SceneInfo::name);
+  const auto* const found = std::ranges::find(kScenes, name, &SceneInfo::name);
   if (found == kScenes.end()) {
     std::array<std::string_view, kScenes.size()> names;
     std::ranges::transform(kScenes, names.begin(), &SceneInfo::name);

@@ -4,6 +4,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/builder.hpp"
+#include "src/canvas.hpp"
 #include "src/layouts.hpp"
 #include "src/painters.hpp"
 #include "src/room.hpp"
@@ -74,7 +75,7 @@ void lay_out_structure(Builder builder, const StructureCase& which, Random rando
   const float far_y = near_y - (which.near ? 0.9F : 1.6F);
   const int legs = which.near ? 8 : 6;
   for (int leg = 0; leg <= legs; ++leg) {
-    const double x =
+    const auto x =
         static_cast<double>(begin + kStage_m * static_cast<float>(leg) / static_cast<float>(legs));
     builder.scene().waypoints.emplace_back(x, static_cast<double>(leg % 2 == 0 ? far_y : near_y));
   }

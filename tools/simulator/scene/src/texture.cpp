@@ -36,11 +36,11 @@ float luminance_variance(const std::vector<Rgb>& pixels) {
   double sum = 0;
   double squares = 0;
   for (const Rgb& pixel : pixels) {
-    const double value = static_cast<double>(luminance(pixel));
+    const auto value = static_cast<double>(luminance(pixel));
     sum += value;
     squares += value * value;
   }
-  const double count = static_cast<double>(pixels.size());
+  const auto count = static_cast<double>(pixels.size());
   const double mean = sum / count;
   return static_cast<float>(std::max(0.0, squares / count - mean * mean));
 }

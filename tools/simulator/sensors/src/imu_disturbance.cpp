@@ -1,7 +1,6 @@
 #include "src/imu_disturbance.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

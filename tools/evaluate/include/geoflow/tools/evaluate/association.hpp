@@ -27,6 +27,7 @@ using PosePairs = std::vector<PosePair>;
 
 struct AssociationOptions {
   /// Poses further apart in time than this are no pair.
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   Duration max_difference = std::chrono::milliseconds{10};
   /// Added to the estimate's times first. At most kMaxOffset either way.
   Duration offset{};

@@ -41,6 +41,7 @@ struct RelativeOptions {
   bool all_pairs = false;
   /// How much longer or shorter a stretch may be, as a fraction of delta, where the one nearest to
   /// delta is chosen: with all_pairs in metres and degrees, and in seconds.
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double tolerance = 0.1;
 };
 

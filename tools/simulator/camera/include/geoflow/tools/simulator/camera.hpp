@@ -94,6 +94,7 @@ class CameraSimulator {
 };
 
 /// Pose of the left infrared camera in the colour camera's frame, as calibrated on a D435i.
+// NOLINTNEXTLINE(readability-identifier-naming): a transform keeps its frames' names
 [[nodiscard]] SE3 d435i_T_cam_ir();
 
 /// Intrinsics of a D435i's colour camera and of its infrared cameras at a size [px].

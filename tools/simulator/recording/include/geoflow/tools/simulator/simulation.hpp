@@ -24,6 +24,7 @@ namespace geoflow::simulator {
 struct SimulationOptions {
   std::string scene = "office";  ///< one of scenes()
   std::uint64_t seed = 1;        ///< of scene, walk and all sensors
+  // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   double duration_s = 60;
   WalkOptions walk{};  ///< seed and duration are those above
   ImuOptions imu{};

@@ -76,7 +76,8 @@ class Random {
       : key_{subkey(seed, purpose)} {}
 
   [[nodiscard]] constexpr std::uint64_t bits() noexcept {
-    return scramble(key_ + counter_++ * 0x632be59bd9b4e019ULL);
+    constexpr std::uint64_t kStride = 0x632be59bd9b4e019ULL;  // odd, thus a bijection of counters
+    return scramble(key_ + counter_++ * kStride);
   }
   [[nodiscard]] constexpr float uniform() noexcept { return to_unit(bits()); }
   [[nodiscard]] constexpr float uniform(float low, float high) noexcept {

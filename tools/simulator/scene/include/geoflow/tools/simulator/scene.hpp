@@ -51,8 +51,10 @@ struct Patch {
 struct Capsule {
   Eigen::Vector3f start = Eigen::Vector3f::Zero();  ///< [m] in world
   Eigen::Vector3f end = Eigen::Vector3f::Zero();    ///< [m] in world
+  // NOLINTBEGIN(readability-magic-numbers): named by the members
   float start_radius_m = 0.1F;
   float end_radius_m = 0.1F;
+  // NOLINTEND(readability-magic-numbers)
   int material = 0;
 };
 
@@ -79,9 +81,11 @@ class Pedestrian {
  public:
   struct Walk {
     std::vector<Eigen::Vector2f> waypoints;  ///< [m] in world, at least two, distinct
+    // NOLINTBEGIN(readability-magic-numbers): named by the members
     float speed_mps = 1.2F;
     float start_m = 0;  ///< distance along the line at time 0
     float height_m = 1.7F;
+    // NOLINTEND(readability-magic-numbers)
     std::array<int, 4> materials{};  ///< skin, top, trousers, shoes
   };
   static constexpr std::size_t kCapsules = 13;
