@@ -30,7 +30,7 @@ struct PatchWarp {
 /// Where in `current` the warped piece of `reference` is, near `start` (raw pixels): Gauss-Newton
 /// on the position alone, with mean and contrast of the patches made equal. Without the warp
 /// Lucas-Kanade prefers, on a floor seen at a slant, the far and finer texture of its window, which
-/// moves less: the motion comes out 1 to 2 % too small, and errors add up from frame to frame.
+/// moves less: the motion comes out too small, and errors add up from frame to frame.
 /// Source: Baker and Matthews, "Lucas-Kanade 20 years on", IJCV 2004 (inverse compositional).
 /// None where the patch leaves an image, strays from `start`, or does not look alike. Pure.
 [[nodiscard]] std::optional<Vector2d> align_patch(const ImagePyramid& reference,
