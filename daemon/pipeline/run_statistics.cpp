@@ -34,12 +34,13 @@ json to_json(const timesync::ClockCounters& counters) {
 
 }  // namespace
 
-void StageTimer::begin(slam::Stage /*stage*/) {
-  began_ = HostClock::now();
+void StageTimer::begin(slam::Stage stage) {
+  began_[static_cast<std::size_t>(stage)] = HostClock::now();
 }
 
 void StageTimer::end(slam::Stage stage) {
-  histograms_[static_cast<std::size_t>(stage)].add(HostClock::now() - began_);
+  const auto i = static_cast<std::size_t>(stage);
+  histograms_[i].add(HostClock::now() - began_[i]);
 }
 
 bool has_pose(TrackingStatus status) noexcept {

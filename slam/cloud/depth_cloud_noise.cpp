@@ -168,19 +168,22 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   const int column = static_cast<int>(cell) % columns;
   const int row = static_cast<int>(cell) / columns;
   PlaneFit plane;
-  const auto add_if_it_continues = [&](int index, bool added) {
+  const auto add_if_it_continues = [&](int index) {
     const Eigen::Vector3f& other = rays_[static_cast<std::size_t>(index)];
     const Eigen::Vector2f ray = other.head<2>() - ray0;
     const float q = other.z() - q0;
-    if (!added && other.z() > 0 && std::abs(q - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
+    if (other.z() > 0 && std::abs(q - slope.dot(ray)) <= kNeighbourSigmas * sigma_) {
       plane.add(ray, q);
     }
   };
+  add_if_it_continues(static_cast<int>(cell));
   for (int ring = 1; ring <= kRings && best.w() > enough; ++ring) {
     for (int r = std::max(row - ring, 0); r <= std::min(row + ring, grid_->rows() - 1); ++r) {
-      for (int c = std::max(column - ring, 0); c <= std::min(column + ring, columns - 1); ++c) {
-        const bool added = ring > 1 && std::max(std::abs(r - row), std::abs(c - column)) < ring;
-        add_if_it_continues(r * columns + c, added);
+      const int step = std::abs(r - row) == ring ? 1 : 2 * ring;
+      for (int c = column - ring; c <= column + ring; c += step) {
+        if (c >= 0 && c < columns) {
+          add_if_it_continues(r * columns + c);
+        }
       }
     }
     PlaneFit fitted = plane;

@@ -13,6 +13,7 @@
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/slam/config.hpp"
@@ -59,26 +60,40 @@ Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration
       grid_{std::move(grid)},
       observer_{observer} {}
 
+Tracker::~Tracker() {
+  cloud_building_.wait();
+}
+
 void Tracker::begin_frame(const SyncedPacket& packet) {
+  finish_frame();
   std::swap(previous_, current_);
   current_ = Frame{};
   current_.t = packet.t;
-  {
-    const StageScope scope{observer_, Stage::kPyramid};
-    current_.pyramid = std::make_shared<const ImagePyramid>(
-        gray_image(packet.color), config_.flow.window_px, config_.flow.levels);
-  }
+  current_.depth = packet.depth;
+  cloud_building_.run([this] { build_cloud(); });
+  const StageScope scope{observer_, Stage::kPyramid};
+  current_.pyramid = std::make_shared<const ImagePyramid>(
+      gray_image(packet.color), config_.flow.window_px, config_.flow.levels);
+}
+
+void Tracker::finish_frame() {
+  cloud_building_.wait();
+}
+
+void Tracker::build_cloud() {
   const StageScope scope{observer_, Stage::kCloud};
-  if (packet.depth) {
-    auto cloud =
-        std::make_shared<DepthCloud>(grid_,
-                                     DepthCloud::Pixels{.unit_m = calibration_.depth_unit_m,
-                                                        .alignment = calibration_.depth_alignment},
-                                     DepthCloudConfig{});
-    if (cloud->build(packet.depth)) {
-      current_.cloud = std::move(cloud);
-      current_.depth = packet.depth;
-    }
+  if (!current_.depth) {
+    return;
+  }
+  auto cloud =
+      std::make_shared<DepthCloud>(grid_,
+                                   DepthCloud::Pixels{.unit_m = calibration_.depth_unit_m,
+                                                      .alignment = calibration_.depth_alignment},
+                                   DepthCloudConfig{});
+  if (cloud->build(current_.depth)) {
+    current_.cloud = std::move(cloud);
+  } else {
+    current_.depth = FrameRef{};
   }
 }
 
@@ -101,6 +116,7 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
     seeds.push_back(seed);
   }
   const auto tracks = flow_.track(*previous_.pyramid, *current_.pyramid, seeds);
+  finish_frame();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (const std::optional<Vector2d>& track = tracks[i]) {
       const std::optional<PointId>& id = previous_.features[i].point;
@@ -137,6 +153,7 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
       expected.push_back({camera_.distort(camera_.project(p_cam)), point->descriptor});
     }
   }
+  finish_frame();
   describe();
   const std::vector<OrbFeature>& found = current_.place->features;
   const std::vector<int> match = match_by_projection(expected, found, kRadiusPx);

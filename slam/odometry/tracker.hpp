@@ -4,6 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include <tbb/task_group.h>
+
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -44,9 +46,14 @@ class Tracker {
  public:
   Tracker(const Config& config, const GicpConfig& gicp, const Calibration& calibration,
           std::shared_ptr<const CellGrid> grid, StageObserver* observer);
+  Tracker(const Tracker&) = delete;
+  Tracker& operator=(const Tracker&) = delete;
+  ~Tracker();
 
-  /// Reads a packet's images into the current frame, and the one before into previous().
+  /// Makes a packet's images the current frame, and the current frame the one before. Its depth is
+  /// read on a thread of TBB's meanwhile: finish_frame() waits for it, track() by itself.
   void begin_frame(const SyncedPacket& packet);
+  void finish_frame();
 
   /// Pose of the current frame, given its prediction and what made it. Features that contradict it
   /// are dropped from the frame.
@@ -62,6 +69,7 @@ class Tracker {
     bool sure = false;  ///< as in TrackingResult
   };
   void follow(const Map& map, const SE3& T_odom_cam_predicted);
+  void build_cloud();
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
   void describe();
@@ -96,7 +104,8 @@ class Tracker {
   StageObserver* observer_;
   Frame previous_;
   Frame current_;
-  bool fixed_ = true;  ///< the last frame, by points or depth
+  tbb::task_group cloud_building_;  ///< of the current frame
+  bool fixed_ = true;               ///< the last frame, by points or depth
 };
 
 }  // namespace geoflow::slam

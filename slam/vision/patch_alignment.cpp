@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <opencv2/core.hpp>
 
 #include "geoflow/hal/geometry.hpp"
@@ -28,19 +28,22 @@ using Patch = Eigen::Array<float, kSide, kSide>;
 using WidePatch = Eigen::Array<float, kWide, kWide>;
 
 /// A gray level between pixels. Precondition: inside by a pixel.
-float bilinear(const cv::Mat& image, double x, double y) {
+float bilinear(const cv::Mat& image, float x, float y) {
   const int column = static_cast<int>(x);
   const int row = static_cast<int>(y);
-  const auto fx = static_cast<float>(x - column);
-  const auto fy = static_cast<float>(y - row);
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
   const auto* upper = image.ptr<std::uint8_t>(row) + column;
   const auto* lower = image.ptr<std::uint8_t>(row + 1) + column;
   const auto mix = [](float a, float b, float share) { return a + share * (b - a); };
   return mix(mix(upper[0], upper[1], fx), mix(lower[0], lower[1], fx), fy);
 }
 
+/// Whether there are four pixels around, also after rounding to single precision.
 bool inside(const cv::Mat& image, double x, double y) {
-  return x >= 0 && y >= 0 && x < image.cols - 1 && y < image.rows - 1;
+  constexpr double kRoundingPx = 0.01;
+  return x >= kRoundingPx && y >= kRoundingPx && x < image.cols - 1 - kRoundingPx &&
+         y < image.rows - 1 - kRoundingPx;
 }
 
 /// The reference as it would look in the current image, from the level of about its resolution.
@@ -50,16 +53,25 @@ std::optional<WidePatch> warped(const ImagePyramid& reference, const PatchWarp& 
   const cv::Mat& image = reference.levels()[2 * static_cast<std::size_t>(level)];
   Matrix3d H = warp.H_reference_offset;
   H.topRows<2>() *= std::ldexp(1.0, -level);
+  constexpr double kRim = kPatchRadiusPx + 1;
+  for (const auto& [x, y] : {std::pair{-kRim, -kRim}, {kRim, -kRim}, {kRim, kRim}, {-kRim, kRim}}) {
+    const Vector3d corner = H * Vector3d{x, y, 1};
+    const Vector2d pixel = corner.hnormalized();
+    if (!(corner.z() > 0) || !inside(image, pixel.x(), pixel.y())) {
+      return std::nullopt;  // where its corners are inside, so is all of a convex patch
+    }
+  }
+  using WideRow = Eigen::Array<float, kWide, 1>;
+  const Eigen::Matrix3f Hf = H.cast<float>();
+  const WideRow offsets = WideRow::LinSpaced(-kRim, kRim);
   WidePatch patch;
   for (int row = 0; row < kWide; ++row) {
-    constexpr double kRim = -kPatchRadiusPx - 1;
-    Vector3d homogeneous = H * Vector3d{kRim, kRim + row, 1};
-    for (int column = 0; column < kWide; ++column, homogeneous += H.col(0)) {
-      const Vector2d pixel = homogeneous.hnormalized();
-      if (!inside(image, pixel.x(), pixel.y())) {
-        return std::nullopt;
-      }
-      patch(column, row) = bilinear(image, pixel.x(), pixel.y());
+    const Eigen::Vector3f left = Hf.rightCols<2>() * Eigen::Vector2f{offsets[row], 1};
+    const WideRow inverse = (left.z() + Hf(2, 0) * offsets).inverse();
+    const WideRow x = (left.x() + Hf(0, 0) * offsets) * inverse;
+    const WideRow y = (left.y() + Hf(1, 0) * offsets) * inverse;
+    for (int column = 0; column < kWide; ++column) {
+      patch(column, row) = bilinear(image, x[column], y[column]);
     }
   }
   return patch;
@@ -100,27 +112,33 @@ struct Template {
   Eigen::Matrix2d information;
 };
 
-std::optional<Patch> normalised(const Patch& patch) {
-  constexpr float kLeastContrast = 2;  // standard deviation, of the order of a camera's noise
+/// A patch's gray levels less their mean, of unit norm.
+struct Normalised {
+  Patch gray;
+  float contrast;  ///< the norm they had
+};
+
+/// Nothing where there is no more contrast than a camera's noise.
+std::optional<Normalised> normalised(const Patch& patch) {
+  constexpr float kLeastContrast = 2;  // standard deviation
   const Patch centred = patch - patch.mean();
   const float norm = centred.matrix().norm();
   if (!(norm > kLeastContrast * kSide)) {
     return std::nullopt;
   }
-  return centred / norm;
+  return Normalised{.gray = centred * (1 / norm), .contrast = norm};
 }
 
 std::optional<Template> make_template(const WidePatch& wide) {
-  const Patch gray = wide.block<kSide, kSide>(1, 1);
-  const auto unit = normalised(gray);
+  const auto unit = normalised(wide.block<kSide, kSide>(1, 1));
   if (!unit) {
     return std::nullopt;
   }
-  const float norm = (gray - gray.mean()).matrix().norm();
+  const float per_difference = 1 / (2 * unit->contrast);
   Template made{
-      .gray = *unit,
-      .by_x = (wide.block<kSide, kSide>(2, 1) - wide.block<kSide, kSide>(0, 1)) / (2 * norm),
-      .by_y = (wide.block<kSide, kSide>(1, 2) - wide.block<kSide, kSide>(1, 0)) / (2 * norm),
+      .gray = unit->gray,
+      .by_x = (wide.block<kSide, kSide>(2, 1) - wide.block<kSide, kSide>(0, 1)) * per_difference,
+      .by_y = (wide.block<kSide, kSide>(1, 2) - wide.block<kSide, kSide>(1, 0)) * per_difference,
       .information = {}};
   // Mean and contrast are free: what they explain of the derivatives says nothing of the position.
   for (Patch* derivative : {&made.by_x, &made.by_y}) {
@@ -159,12 +177,16 @@ std::optional<PatchWarp> make_warp(const Eigen::Matrix<double, 2, 4>& corners) {
                       1 + denominators.x() + denominators.y() > 0;
   Eigen::Matrix2d stretch;
   stretch << (p1 + p2 - p0 - p3) / (4 * kRadius), (p2 + p3 - p0 - p1) / (4 * kRadius);
-  const Vector2d singular = Eigen::JacobiSVD<Eigen::Matrix2d>{stretch}.singularValues();
-  if (!convex || !warp.H_reference_offset.allFinite() || !(singular.y() > 0)) {
+  // Its singular values: the product is |det|, the sum of squares the squared Frobenius norm.
+  const double product = std::abs(stretch.determinant());
+  const double sum2 = stretch.squaredNorm() + 2 * product;
+  const double difference2 = std::max(0.0, stretch.squaredNorm() - 2 * product);
+  if (!convex || !warp.H_reference_offset.allFinite() || !(product > 0)) {
     return std::nullopt;
   }
-  warp.scale = std::sqrt(singular.x() * singular.y());
-  warp.anisotropy = singular.x() / singular.y();
+  warp.scale = std::sqrt(product);
+  const double larger = 0.5 * (std::sqrt(sum2) + std::sqrt(difference2));
+  warp.anisotropy = larger * larger / product;
   return warp;
 }
 
@@ -197,7 +219,7 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
     if (!seen) {
       return std::nullopt;
     }
-    const Patch difference = *seen - sought.gray;
+    const Patch difference = seen->gray - sought.gray;
     const Vector2d gradient{static_cast<double>((sought.by_x * difference).sum()),
                             static_cast<double>((sought.by_y * difference).sum())};
     const Vector2d step = covariance * gradient;
@@ -206,7 +228,7 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
       return std::nullopt;
     }
     if (step.norm() < kConvergedPx) {
-      const double correlation = static_cast<double>((*seen * sought.gray).sum());
+      const double correlation = static_cast<double>((seen->gray * sought.gray).sum());
       return correlation > kAlike ? std::optional{pixel} : std::nullopt;
     }
   }

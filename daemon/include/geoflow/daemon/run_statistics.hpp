@@ -32,7 +32,7 @@ struct RunCounters {
       by_status{};  ///< estimates, by TrackingStatus
 };
 
-/// Measures the estimator's stages for one thread, into its own histograms.
+/// Measures the estimator's stages, each into its own histogram.
 class StageTimer final : public slam::StageObserver {
  public:
   void begin(slam::Stage stage) override;
@@ -43,7 +43,7 @@ class StageTimer final : public slam::StageObserver {
 
  private:
   std::array<TimeHistogram, slam::kStageCount> histograms_;
-  HostTime began_;
+  std::array<HostTime, slam::kStageCount> began_;
 };
 
 /// All that is measured of one run.

@@ -20,8 +20,9 @@ inline constexpr std::size_t kStageCount = 8;
 
 [[nodiscard]] const char* to_string(Stage stage) noexcept;
 
-/// Told when a stage begins and ends, in the thread that works on it; stages do not nest. slam has
-/// no clock: who wants times measures them here.
+/// Told when a stage begins and ends, in the thread that works on it. Different stages overlap, in
+/// different threads; no stage overlaps itself. slam has no clock: who wants times measures them
+/// here.
 class StageObserver {
  public:
   StageObserver() = default;
