@@ -58,8 +58,9 @@ std::vector<double> noise_image(const CameraIntrinsics& camera, const DepthNoise
                                 std::mt19937_64& random) {
   const auto size = static_cast<std::size_t>(camera.width * camera.height);
   std::vector<double> white(size);
-  std::normal_distribution<double> normal{0, noise.inverse_depth_sigma * noise.blur_px};
-  std::generate(white.begin(), white.end(), [&] { return normal(random); });
+  const double sigma = noise.inverse_depth_sigma * noise.blur_px;  // may be 0
+  std::normal_distribution<double> normal;
+  std::generate(white.begin(), white.end(), [&] { return sigma * normal(random); });
   if (noise.blur_px == 1) {
     return white;
   }
