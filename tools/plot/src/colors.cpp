@@ -19,10 +19,14 @@ constexpr std::array<Color, 7> kAnchors{{{.red = 0.050, .green = 0.030, .blue = 
                                          {.red = 0.933, .green = 0.486, .blue = 0.316},
                                          {.red = 0.988, .green = 0.710, .blue = 0.170}}};
 // NOLINTEND(modernize-use-std-numbers)
+constexpr Color kUnknown{.red = 0.5, .green = 0.5, .blue = 0.5};
 
 }  // namespace
 
 Color color_map(double fraction) noexcept {
+  if (std::isnan(fraction)) {
+    return kUnknown;
+  }
   const double place = std::clamp(fraction, 0.0, 1.0) * (kAnchors.size() - 1);
   const auto index = std::min(static_cast<std::size_t>(place), kAnchors.size() - 2);
   const double t = place - static_cast<double>(index);
