@@ -135,7 +135,6 @@ class Core::Impl {
   };
 
   PoseEstimate start(const SyncedPacket& packet) {
-    tracker_.finish_frame();
     Frame& frame = tracker_.current();
     frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
     motion_.update(packet.t, frame.T_odom_cam, Matrix6d::Zero(), true);

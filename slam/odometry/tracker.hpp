@@ -51,16 +51,18 @@ class Tracker {
   ~Tracker();
 
   /// Makes a packet's images the current frame, and the current frame the one before. Its depth is
-  /// read on a thread of TBB's meanwhile: finish_frame() waits for it, track() by itself.
+  /// read on a thread of TBB's from now on; whatever needs it waits for it.
   void begin_frame(const SyncedPacket& packet);
-  void finish_frame();
 
   /// Pose of the current frame, given its prediction and what made it. Features that contradict it
   /// are dropped from the frame.
   [[nodiscard]] TrackingResult track(Map& map, const PosePrior& prior, PoseSource predicted_by);
 
-  [[nodiscard]] Frame& current() noexcept { return current_; }
-  [[nodiscard]] const Frame& current() const noexcept { return current_; }
+  /// Waits until the frame is read.
+  [[nodiscard]] Frame& current() {
+    finish_frame();
+    return current_;
+  }
 
  private:
   struct InitialPose {
@@ -70,6 +72,7 @@ class Tracker {
   };
   void follow(const Map& map, const SE3& T_odom_cam_predicted);
   void build_cloud();
+  void finish_frame();
   void follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted);
   void follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predicted);
   void describe();
