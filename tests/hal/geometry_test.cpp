@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -14,10 +15,10 @@ namespace {
 
 /// Awkward tangents: zero, tiny, near pi, pure rotation and translation, and random ones.
 std::vector<Vector6d> tangents() {
-  constexpr double kPi = 3.14159265358979323846;
+  using std::numbers::pi;
   std::vector<Vector6d> all;
   for (const double angle :
-       {0.0, 1e-12, 1e-7, 9e-5, 1.1e-4, 1e-3, 9e-3, 1.1e-2, 0.5, 2.0, kPi - 1e-6}) {
+       {0.0, 1e-12, 1e-7, 9e-5, 1.1e-4, 1e-3, 9e-3, 1.1e-2, 0.5, 2.0, pi - 1e-6}) {
     for (const Vector3d& axis :
          {Vector3d{1, 0, 0}, Vector3d{0, -1, 0}, Vector3d{1, 2, -3}.normalized().eval()}) {
       for (const Vector3d& rho : {Vector3d{0, 0, 0}, Vector3d{1, -2, 0.5}, Vector3d{1e-6, 0, 0}}) {

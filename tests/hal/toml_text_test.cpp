@@ -45,7 +45,7 @@ TEST(TomlText, NamesTheLineOfWhatItRefuses) {
            Case{"a = 1\n\xC3\xA9 = 2\n", "f:2: "},
            Case{std::string_view{"a = \0", 5}, "f:1: "},
            Case{"a = 'open\n[=]\n", "f:2: "},
-           Case{"\"\\\\\" [,", "f:1: "},
+           Case{R"("\\" [,)", "f:1: "},
        }) {
     const auto checked = check_toml_text("f", bad.text);
     ASSERT_FALSE(checked) << bad.text;

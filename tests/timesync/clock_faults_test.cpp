@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -220,7 +221,7 @@ TEST(ClockModel, FollowsAWanderingOscillator) {
   const std::int64_t offset_ns = stream.clock.offset_ns;
   double worst_ns = 0;
   for (int i = 0; i < 60'000; ++i) {  // 10 min; the rate swings by +-5 ppm with a period of 5 min
-    phase_ns += 5e-6 * std::sin(2 * M_PI * i / 30'000) * kSecondNs / kRateHz;
+    phase_ns += 5e-6 * std::sin(2 * std::numbers::pi * i / 30'000) * kSecondNs / kRateHz;
     stream.clock.offset_ns = offset_ns + static_cast<std::int64_t>(phase_ns);
     const double error_ns = std::abs(stream.feed(i / kRateHz).error_ns);
     worst_ns = i < 500 ? 0.0 : std::max(worst_ns, error_ns);

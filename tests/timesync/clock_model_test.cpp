@@ -1,4 +1,3 @@
-#include "geoflow/timesync/clock_model.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -79,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(
       std::string name = tested.param.jitter.name + "_" +
                          std::to_string(static_cast<int>(tested.param.jitter.scale_ns / 1e3)) +
                          "us";
-      std::replace(name.begin(), name.end(), ' ', '_');
+      std::ranges::replace(name, ' ', '_');
       return name;
     });
 

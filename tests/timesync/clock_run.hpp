@@ -19,8 +19,8 @@ using Model = ClockModel<CameraClock>;
 
 inline constexpr std::int64_t kHostStartNs = 5'000'000'000'000;
 inline constexpr double kSecondNs = 1e9;
-inline const StampInfo kDevice{.domain = StampDomain::kDevice};
-inline const StampInfo kWrapping{.domain = StampDomain::kDevice, .wrap = Duration{kWrap32Us}};
+inline constexpr StampInfo kDevice{.domain = StampDomain::kDevice};
+inline constexpr StampInfo kWrapping{.domain = StampDomain::kDevice, .wrap = Duration{kWrap32Us}};
 
 inline DeviceTime<CameraClock> device(std::int64_t ns) {
   return DeviceTime<CameraClock>{Duration{ns}};

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +8,6 @@
 
 #include <gtest/gtest.h>
 
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"

@@ -64,7 +64,7 @@ TEST(Doorbell, LosesNoRingBetweenTwoThreads) {
   auto bell = Doorbell::create();
   ASSERT_TRUE(bell);
   SpscRing<std::uint64_t> ring{16};
-  std::jthread producer{[&] {
+  const std::jthread producer{[&] {
     for (std::uint64_t i = 0; i < kValues; ++i) {
       while (!ring.try_push(i)) {
         std::this_thread::yield();

@@ -84,7 +84,7 @@ TEST(DropOldestRing, TwoThreadsAccountForEveryElement) {
     for (const std::uint64_t pause_every : {1U, 100U}) {
       DropOldestRing<Counted> ring{capacity};
       std::atomic<bool> done = false;
-      std::jthread producer{[&] {
+      const std::jthread producer{[&] {
         for (std::uint64_t i = 1; i <= kValues; ++i) {
           ring.push(Counted{i});
         }

@@ -1,7 +1,6 @@
 #include "geoflow/timesync/latest.hpp"
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <thread>
@@ -37,7 +36,7 @@ using Wide = std::array<std::uint64_t, 32>;
 TEST(Latest, NeverTearsAndNeverGoesBackBetweenTwoThreads) {
   constexpr std::uint64_t kStores = 200'000;
   Latest<Wide> latest;
-  std::jthread writer{[&latest] {
+  const std::jthread writer{[&latest] {
     for (std::uint64_t i = 1; i <= kStores; ++i) {
       Wide value;
       value.fill(i);

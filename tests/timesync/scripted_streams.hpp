@@ -72,6 +72,7 @@ inline std::vector<SyncedPacket> flush_all(Synchroniser& synchroniser) {
 template <typename Sample>
 std::vector<double> times_ms(const std::vector<Timed<Sample>>& samples) {
   std::vector<double> times;
+  times.reserve(samples.size());
   for (const auto& sample : samples) {
     times.push_back(to_ms(sample.t.time_since_epoch()));
   }

@@ -1,6 +1,5 @@
 #include "geoflow/timesync/spsc_ring.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -61,7 +60,7 @@ TEST(SpscRing, TwoThreadsLoseNothingAndKeepTheOrder) {
   constexpr std::uint64_t kValues = 200'000;
   {
     SpscRing<Counted> ring{64};
-    std::jthread producer{[&ring] {
+    const std::jthread producer{[&ring] {
       for (std::uint64_t i = 0; i < kValues; ++i) {
         while (!ring.try_push(Counted{i})) {
           std::this_thread::yield();

@@ -22,12 +22,11 @@ namespace geoflow::timesync::tests {
 namespace {
 
 using ::testing::DoubleEq;
-using ::testing::ElementsAre;
 using ::testing::Pointwise;
 
-const SynchroniserStreams kCameraOnly{};
-const SynchroniserStreams kWithImu{.imu = StampInfo{}};
-const SynchroniserStreams kAll{.imu = StampInfo{}, .legs = StampInfo{}};
+constexpr SynchroniserStreams kCameraOnly{};
+constexpr SynchroniserStreams kWithImu{.imu = StampInfo{}};
+constexpr SynchroniserStreams kAll{.imu = StampInfo{}, .legs = StampInfo{}};
 
 TEST(Synchroniser, PairsColourWithDepthOfTheSameInstantAtOnce) {
   Synchroniser sync{{}, kCameraOnly};

@@ -11,7 +11,11 @@
 #include <clang/AST/ASTConsumer.h>
 #include <clang/AST/ASTContext.h>
 #include <clang/AST/DeclGroup.h>
+#include <clang/Basic/SourceManager.h>
+#include <clang/Frontend/CompilerInstance.h>
+#include <clang/Frontend/FrontendAction.h>
 #include <clang/Frontend/FrontendPluginRegistry.h>
+#include <llvm/ADT/StringRef.h>
 
 namespace {
 
@@ -25,10 +29,9 @@ class OwnScope final : public clang::ASTConsumer {
   void HandleTranslationUnit(clang::ASTContext& context) override {
     const clang::SourceManager& sources = context.getSourceManager();
     std::vector<clang::Decl*> own;
-    std::copy_if(top_level_.begin(), top_level_.end(), std::back_inserter(own),
-                 [&](const clang::Decl* decl) {
-                   return !sources.isInSystemHeader(sources.getExpansionLoc(decl->getLocation()));
-                 });
+    std::ranges::copy_if(top_level_, std::back_inserter(own), [&](const clang::Decl* decl) {
+      return !sources.isInSystemHeader(sources.getExpansionLoc(decl->getLocation()));
+    });
     context.setTraversalScope(own);
   }
 
@@ -48,7 +51,7 @@ class OwnScopeAction final : public clang::PluginASTAction {
   ActionType getActionType() override { return AddBeforeMainAction; }
 };
 
-const clang::FrontendPluginRegistry::Add<OwnScopeAction> kRegistered{
+const clang::FrontendPluginRegistry::Add<OwnScopeAction> registered{
     "own-scope", "walks the project's own declarations only"};
 
 }  // namespace

@@ -68,6 +68,16 @@ def digest(entry, files):
     return state.hexdigest()
 
 
+def sources_of(entries):
+    """The project's sources, each once with all of its compile commands: clang-tidy runs under every one of them."""
+    commands = {}
+    for entry in entries:
+        path = Path(entry["file"])
+        if path.is_relative_to(TOP) and not path.is_relative_to(TOP / "build"):
+            commands.setdefault(entry["file"], []).append(entry["command"])
+    return [{"file": file, "command": " ".join(of_file)} for file, of_file in commands.items()]
+
+
 def changed_files():
     """Files that differ from main or are new."""
     base = run("git", "merge-base", "HEAD", "main").stdout.strip() or "HEAD"
@@ -102,8 +112,7 @@ def main():
         sys.exit(f"{database}: missing; run cmake --preset clang")
     PASSED.mkdir(parents=True, exist_ok=True)
     entries = json.loads(database.read_text())
-    sources = [entry for entry in entries
-               if Path(entry["file"]).is_relative_to(TOP) and not Path(entry["file"]).is_relative_to(TOP / "build")]
+    sources = sources_of(entries)
     wanted = None if arguments.all else changed_files()
     if arguments.files:
         wanted = {Path(name).resolve() for name in arguments.files}

@@ -12,6 +12,7 @@
 namespace geoflow::tests {
 
 std::optional<std::filesystem::path> data_path(std::string_view name) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): never set here
   const char* root = std::getenv("GEOFLOW_DATA");
   if (root == nullptr) {
     return std::nullopt;
@@ -24,6 +25,7 @@ std::optional<std::filesystem::path> data_path(std::string_view name) {
 }
 
 std::uint64_t test_seed(std::uint64_t fallback) {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): never set here
   const char* seed = std::getenv("GEOFLOW_TEST_SEED");
   return seed == nullptr ? fallback : std::stoull(seed);
 }

@@ -35,4 +35,4 @@ class TemporaryDirectory {
   if (!variable##_found) {                                                        \
     GTEST_SKIP() << "needs " << (name) << " in the folder named by GEOFLOW_DATA"; \
   }                                                                               \
-  const std::filesystem::path variable = *variable##_found
+  const std::filesystem::path& variable = *variable##_found
