@@ -118,7 +118,7 @@ std::vector<std::vector<double>> read_csv(const std::filesystem::path& path) {
   std::string line;
   std::getline(file, line);
   while (std::getline(file, line)) {
-    std::replace(line.begin(), line.end(), ',', ' ');
+    std::ranges::replace(line, ',', ' ');
     std::istringstream fields{line};
     std::vector<double> row;
     for (double value = 0; fields >> value;) {

@@ -31,7 +31,7 @@ class SineMotion {
   struct Sine {
     Vector3d amplitude;
     Vector3d phase;
-    double rate_radps;
+    double rate_radps = 0;
   };
   struct Value {
     Vector3d value;

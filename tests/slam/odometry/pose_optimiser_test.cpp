@@ -9,16 +9,14 @@
 #include <gtest/gtest.h>
 
 #include "geoflow/hal/geometry.hpp"
-#include "geoflow/slam/config.hpp"
 
-#include "cloud/gicp.hpp"
 #include "vision/camera_model.hpp"
 
 /// Points in front of a camera, some of which move on their own.
 namespace geoflow::slam {
 namespace {
 
-const CameraModel kCamera{
+const CameraModel pinhole{
     {.width = 640, .height = 480, .fx = 600, .fy = 600, .cx = 319.5, .cy = 239.5}};
 
 /// Matches of `still` points, seen from T_odom_cam, and of `moving` ones that have moved.
@@ -33,7 +31,7 @@ std::vector<VisualMatch> matches(const SE3& T_odom_cam, std::size_t still, std::
     const Vector3d p_odom{across(random), across(random), along(random)};
     const Vector3d now = i < still ? p_odom : Vector3d{p_odom + moved_m};
     const Vector2d pixel =
-        kCamera.project(T_odom_cam.inverse() * now) + Vector2d{noise_px(random), noise_px(random)};
+        pinhole.project(T_odom_cam.inverse() * now) + Vector2d{noise_px(random), noise_px(random)};
     found.push_back({.p_odom = p_odom, .pixel = pixel});
   }
   return found;
@@ -52,7 +50,7 @@ class PoseOptimiserTest : public testing::Test {
     const PoseSolution solution = optimiser_.solve(problem, problem.prior.T_odom_cam);
     return (T_odom_cam.inverse() * solution.T_odom_cam).translation().norm();
   }
-  PoseOptimiser optimiser_{{}, {}, {}, kCamera};
+  PoseOptimiser optimiser_{{}, {}, {}, pinhole};
   SE3 T_odom_cam_{Eigen::Quaterniond{Eigen::AngleAxisd{0.02, Vector3d{0.3, 1, 0}.normalized()}},
                   Vector3d{0.03, -0.01, 0.05}};
 };
@@ -94,7 +92,7 @@ TEST_F(PoseOptimiserTest, TheCovarianceIsThatOfTheErrors) {
     std::normal_distribution<double> noise_px{0, 1};
     auto seen = matches(T_odom_cam_, 80, 0, Vector3d::Zero());
     for (VisualMatch& match : seen) {
-      match.pixel = kCamera.project(T_odom_cam_.inverse() * match.p_odom) +
+      match.pixel = pinhole.project(T_odom_cam_.inverse() * match.p_odom) +
                     Vector2d{noise_px(random), noise_px(random)};
     }
     const PoseSolution solution = optimiser_.solve(

@@ -17,7 +17,7 @@
 namespace geoflow::slam {
 namespace {
 
-const CameraModel kCamera{
+const CameraModel pinhole{
     CameraIntrinsics{.width = 640, .height = 480, .fx = 517, .fy = 516, .cx = 318, .cy = 255}};
 
 SE3 random_pose(std::mt19937_64& random, double scale) {
@@ -36,7 +36,7 @@ TEST(Factors, JacobiansMatchDifferences) {
     const SE3 T_odom_a = random_pose(random, 0.6);
     const Vector3d p_odom = T_odom_cam * Vector3d{0.3, -0.2, 1.5 + 0.1 * trial};
     const std::vector<double> point{p_odom.x(), p_odom.y(), p_odom.z()};
-    expect_jacobians(ReprojectionFactor{kCamera, {300, 200}, 1.5}, {block_of(T_odom_cam), point});
+    expect_jacobians(ReprojectionFactor{pinhole, {300, 200}, 1.5}, {block_of(T_odom_cam), point});
     expect_jacobians(PointDepthFactor{1.7, 0.01}, {block_of(T_odom_cam), point});
 
     Matrix6d root = Matrix6d::Random() + 3 * Matrix6d::Identity();
@@ -64,7 +64,7 @@ TEST(Factors, PointBehindTheCameraIsRefused) {
   const std::vector<double> behind{0, 0, -1};
   const std::array<const double*, 2> parameters{pose.data(), behind.data()};
   Vector2d residuals;
-  const ReprojectionFactor factor{kCamera, {0, 0}, 1};
+  const ReprojectionFactor factor{pinhole, {0, 0}, 1};
   EXPECT_FALSE(factor.Evaluate(parameters.data(), residuals.data(), nullptr));
 }
 

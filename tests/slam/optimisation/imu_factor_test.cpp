@@ -8,6 +8,7 @@
 
 #include <ceres/problem.h>
 #include <ceres/solver.h>
+#include <ceres/types.h>
 #include <gtest/gtest.h>
 
 #include "geoflow/hal/calibration.hpp"
@@ -29,7 +30,7 @@ using std::chrono::milliseconds;
 
 constexpr HostTime kBegin{milliseconds{100}};
 constexpr HostTime kEnd{milliseconds{500}};
-const SE3 kCameraImu = SE3::exp((Vector6d() << 0.1, -0.2, 0.05, -0.02, 0.005, 0.011).finished());
+const SE3 T_cam_imu = SE3::exp((Vector6d() << 0.1, -0.2, 0.05, -0.02, 0.005, 0.011).finished());
 
 struct Case {
   Preintegrated measured;
@@ -65,9 +66,9 @@ TEST(ImuFactor, JacobiansMatchDifferences) {
     at.measured.covariance = StateMatrix::Identity() + 0.1 * StateMatrix::Ones();
     const NavState first = at.first.plus(disturbance(random, 0.05));
     const NavState second = at.second.plus(disturbance(random, 0.05));
-    expect_jacobians(ImuFactor{at.measured, kCameraImu, gravity_down()},
-                     {block_of(first.T_odom_imu * kCameraImu.inverse()), speed_of(first),
-                      block_of(second.T_odom_imu * kCameraImu.inverse()), speed_of(second)});
+    expect_jacobians(ImuFactor{at.measured, T_cam_imu, gravity_down()},
+                     {block_of(first.T_odom_imu * T_cam_imu.inverse()), speed_of(first),
+                      block_of(second.T_odom_imu * T_cam_imu.inverse()), speed_of(second)});
   }
 }
 
@@ -76,9 +77,9 @@ TEST(ImuFactor, CostIsTheMahalanobisDistanceAndScalesWithTheVariance) {
   const Case at = random_case(random);
   const NavState second = at.second.plus(disturbance(random, 0.01));
   const auto cost = [&](double variance_scale, const NavState& end) {
-    const ImuFactor factor{at.measured, kCameraImu, gravity_down(), variance_scale};
-    const PoseBlock pose0 = pose_block(at.first, kCameraImu);
-    const PoseBlock pose1 = pose_block(end, kCameraImu);
+    const ImuFactor factor{at.measured, T_cam_imu, gravity_down(), variance_scale};
+    const PoseBlock pose0 = pose_block(at.first, T_cam_imu);
+    const PoseBlock pose1 = pose_block(end, T_cam_imu);
     const SpeedBlock speed0 = speed_block(at.first);
     const SpeedBlock speed1 = speed_block(end);
     const std::array<const double*, 4> blocks{pose0.data(), speed0.data(), pose1.data(),
@@ -104,12 +105,12 @@ TEST(ImuFactor, OptimisationFindsTheSecondStateAgain) {
     const NavState expected =
         predict({at.first, StateMatrix::Zero()}, at.measured, gravity_down()).state;
     const NavState wrong = expected.plus(disturbance(random, 0.05));
-    PoseBlock pose0 = pose_block(at.first, kCameraImu);
-    PoseBlock pose1 = pose_block(wrong, kCameraImu);
+    PoseBlock pose0 = pose_block(at.first, T_cam_imu);
+    PoseBlock pose1 = pose_block(wrong, T_cam_imu);
     SpeedBlock speed0 = speed_block(at.first);
     SpeedBlock speed1 = speed_block(wrong);
     PoseManifold manifold;
-    ImuFactor factor{at.measured, kCameraImu, gravity_down()};
+    ImuFactor factor{at.measured, T_cam_imu, gravity_down()};
     ceres::Problem::Options borrowed;
     borrowed.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     borrowed.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -125,7 +126,7 @@ TEST(ImuFactor, OptimisationFindsTheSecondStateAgain) {
     options.gradient_tolerance = 1e-9;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
-    const NavState found = state_of(pose1.data(), speed1.data(), kCameraImu);
+    const NavState found = state_of(pose1.data(), speed1.data(), T_cam_imu);
     EXPECT_LT(expected.minus(found).norm(), 1e-6) << summary.BriefReport();
   }
 }

@@ -39,6 +39,7 @@ inline void expect_jacobians(const ceres::CostFunction& factor,
       moved[block][static_cast<std::size_t>(column)] += step;
     }
     std::vector<const double*> at;
+    at.reserve(moved.size());
     for (const auto& values : moved) {
       at.push_back(values.data());
     }

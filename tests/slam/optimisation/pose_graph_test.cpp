@@ -11,6 +11,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/map_correction.hpp"
 

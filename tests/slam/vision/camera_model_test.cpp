@@ -23,7 +23,7 @@ CameraIntrinsics with(DistortionModel model,
 }
 
 TEST(CameraModel, UndistortInvertsDistort) {
-  const CameraModel cameras[] = {
+  const std::array cameras = {
       CameraModel{with(DistortionModel::kNone, {})},
       CameraModel{with(DistortionModel::kRadtan,
                        {0.2624, -0.9531, -0.0054, 0.0026, 1.1633})},  // TUM freiburg1
