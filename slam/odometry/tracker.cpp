@@ -115,18 +115,19 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
     }
     seeds.push_back(seed);
   }
-  const auto tracks = flow_.track(*previous_.pyramid, *current_.pyramid, seeds);
+  const auto tracks = flow_.track(
+      *previous_.pyramid, *current_.pyramid, seeds, [&](std::size_t i, const Vector2d& pixel) {
+        const std::optional<PointId>& id = previous_.features[i].point;
+        const MapPoint* point = id ? map.find_point(*id) : nullptr;
+        return point == nullptr
+                   ? std::nullopt
+                   : refiner_.refine(map, *point, T_odom_cam_predicted, *current_.pyramid, pixel);
+      });
   finish_frame();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (const std::optional<Vector2d>& track = tracks[i]) {
-      const std::optional<PointId>& id = previous_.features[i].point;
-      const MapPoint* point = id ? map.find_point(*id) : nullptr;
-      const std::optional<Vector2d> refined =
-          point == nullptr
-              ? std::nullopt
-              : refiner_.refine(map, *point, T_odom_cam_predicted, *current_.pyramid, *track);
-      Feature feature = feature_at(refined.value_or(*track));
-      feature.point = id;
+      Feature feature = feature_at(*track);
+      feature.point = previous_.features[i].point;
       feature.anchor = previous_.features[i].anchor;
       feature.descriptor = previous_.features[i].descriptor;
       current_.features.push_back(feature);

@@ -47,9 +47,16 @@ struct LucasKanade {
 
 }  // namespace
 
-void DualStreamFlow::track_stream(const ImagePyramid& previous, const ImagePyramid& current,
-                                  std::span<const FlowSeed> seeds,
-                                  const std::vector<std::size_t>& chosen, bool from_prediction,
+/// What both streams work on, and which of them it is.
+struct DualStreamFlow::Stream {
+  const ImagePyramid& previous;
+  const ImagePyramid& current;
+  std::span<const FlowSeed> seeds;
+  const Confirm& confirm;
+  bool from_prediction;
+};
+
+void DualStreamFlow::track_stream(const Stream& stream, const std::vector<std::size_t>& chosen,
                                   std::vector<std::optional<Vector2d>>& tracks) const {
   if (chosen.empty()) {
     return;
@@ -57,24 +64,39 @@ void DualStreamFlow::track_stream(const ImagePyramid& previous, const ImagePyram
   std::vector<cv::Point2f> from;
   std::vector<cv::Point2f> to;
   for (const std::size_t i : chosen) {
-    from.push_back(to_cv(seeds[i].previous));
-    to.push_back(from_prediction ? to_cv(seeds[i].predicted.value_or(seeds[i].previous))
-                                 : from.back());
+    const FlowSeed& seed = stream.seeds[i];
+    from.push_back(to_cv(seed.previous));
+    to.push_back(
+        to_cv(stream.from_prediction ? seed.predicted.value_or(seed.previous) : seed.previous));
   }
-  const int levels = from_prediction ? config_.prior_levels : config_.levels;
-  const auto found =
-      LucasKanade{.window_px = config_.window_px, .levels = levels}(previous, current, from, to);
-  std::vector<cv::Point2f> back = from;
-  const auto found_back =
-      LucasKanade{.window_px = config_.window_px, .levels = 0}(current, previous, to, back);
+  const int levels = stream.from_prediction ? config_.prior_levels : config_.levels;
+  const auto found = LucasKanade{.window_px = config_.window_px, .levels = levels}(
+      stream.previous, stream.current, from, to);
 
+  std::vector<std::size_t> doubtful;
+  std::vector<cv::Point2f> from_current;
+  std::vector<cv::Point2f> back;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
-    const Vector2d pixel = from_cv(to[k]);
-    const bool consistent =
-        found[k] != 0 && found_back[k] != 0 &&
-        (from_cv(back[k]) - from_cv(from[k])).norm() <= config_.forward_backward_px;
-    if (consistent && camera_.contains(pixel, 1)) {
-      tracks[chosen[k]] = pixel;
+    const std::size_t i = chosen[k];
+    if (found[k] == 0 || !camera_.contains(from_cv(to[k]), 1)) {
+      continue;
+    }
+    tracks[i] = stream.confirm ? stream.confirm(i, from_cv(to[k])) : std::nullopt;
+    if (!tracks[i]) {
+      doubtful.push_back(i);
+      from_current.push_back(to[k]);
+      back.push_back(from[k]);
+    }
+  }
+  if (doubtful.empty()) {
+    return;
+  }
+  const auto found_back = LucasKanade{.window_px = config_.window_px, .levels = 0}(
+      stream.current, stream.previous, from_current, back);
+  for (std::size_t k = 0; k < doubtful.size(); ++k) {
+    const double off_px = (from_cv(back[k]) - stream.seeds[doubtful[k]].previous).norm();
+    if (found_back[k] != 0 && off_px <= config_.forward_backward_px) {
+      tracks[doubtful[k]] = from_cv(from_current[k]);
     }
   }
 }
@@ -129,7 +151,8 @@ void DualStreamFlow::reject_double_occupancy(std::vector<std::optional<Vector2d>
 
 std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& previous,
                                                            const ImagePyramid& current,
-                                                           std::span<const FlowSeed> seeds) const {
+                                                           std::span<const FlowSeed> seeds,
+                                                           const Confirm& confirm) const {
   std::vector<std::optional<Vector2d>> tracks(seeds.size());
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
@@ -138,14 +161,20 @@ std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& p
       chosen.push_back(i);
     }
   }
-  track_stream(previous, current, seeds, chosen, true, tracks);
+  Stream stream{.previous = previous,
+                .current = current,
+                .seeds = seeds,
+                .confirm = confirm,
+                .from_prediction = true};
+  track_stream(stream, chosen, tracks);
   chosen.clear();
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     if (!tracks[i]) {
       chosen.push_back(i);
     }
   }
-  track_stream(previous, current, seeds, chosen, false, tracks);
+  stream.from_prediction = false;
+  track_stream(stream, chosen, tracks);
   reject_by_epipolar_geometry(seeds, tracks);
   reject_double_occupancy(tracks);
   return tracks;

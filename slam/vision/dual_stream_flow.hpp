@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -26,11 +28,15 @@ struct FlowSeed {
 ///
 /// 1. 3D-to-2D: pyramidal Lucas-Kanade from the predicted pixels of features with a map point.
 /// 2. 2D-to-2D: the rest and the first stream's failures, from where they were in the previous
-/// image. Both are checked forward and backward; then the epipolar geometry of all tracks
-/// (fundamental matrix by RANSAC) drops what does not move with the camera, and a mask keeps two
-/// tracks from ending at the same place.
+/// image. Both are checked forward and backward, but for tracks that something else confirms; then
+/// the epipolar geometry of all tracks (fundamental matrix by RANSAC) drops what does not move with
+/// the camera, and a mask keeps two tracks from ending at the same place.
 class DualStreamFlow {
  public:
+  /// The raw pixel in the current image of the seed of that number, from where flow has found it,
+  /// by a way of its own that needs no check backward; nothing where it cannot tell.
+  using Confirm = std::function<std::optional<Vector2d>(std::size_t seed, const Vector2d& pixel)>;
+
   DualStreamFlow(const FlowConfig& config, const CameraModel& camera)
       : config_{config}, camera_{camera} {}
 
@@ -38,12 +44,13 @@ class DualStreamFlow {
   /// choose.
   [[nodiscard]] std::vector<std::optional<Vector2d>> track(const ImagePyramid& previous,
                                                            const ImagePyramid& current,
-                                                           std::span<const FlowSeed> seeds) const;
+                                                           std::span<const FlowSeed> seeds,
+                                                           const Confirm& confirm = {}) const;
 
  private:
-  void track_stream(const ImagePyramid& previous, const ImagePyramid& current,
-                    std::span<const FlowSeed> seeds, const std::vector<std::size_t>& chosen,
-                    bool from_prediction, std::vector<std::optional<Vector2d>>& tracks) const;
+  struct Stream;
+  void track_stream(const Stream& stream, const std::vector<std::size_t>& chosen,
+                    std::vector<std::optional<Vector2d>>& tracks) const;
   void reject_by_epipolar_geometry(std::span<const FlowSeed> seeds,
                                    std::vector<std::optional<Vector2d>>& tracks) const;
   void reject_double_occupancy(std::vector<std::optional<Vector2d>>& tracks) const;
