@@ -64,8 +64,9 @@ void bind_features(slam::FeatureConfig& c, std::vector<Key>& keys) {
 }
 
 void bind_flow(slam::FlowConfig& c, std::vector<Key>& keys) {
-  auto& [window_px, prior_levels, levels, forward_backward_px, fundamental_px] = c;
+  auto& [window_px, prior_window_px, prior_levels, levels, forward_backward_px, fundamental_px] = c;
   keys.push_back({"slam.flow.window_px", &window_px, 5, 61});
+  keys.push_back({"slam.flow.prior_window_px", &prior_window_px, 5, 61});
   keys.push_back({"slam.flow.prior_levels", &prior_levels, 0, 6});
   keys.push_back({"slam.flow.levels", &levels, 0, 6});
   keys.push_back({"slam.flow.forward_backward_px", &forward_backward_px, 0.01, 20});

@@ -1,5 +1,6 @@
 #include "vision/dual_stream_flow.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -70,7 +71,11 @@ void DualStreamFlow::track_stream(const Stream& stream, const std::vector<std::s
         to_cv(stream.from_prediction ? seed.predicted.value_or(seed.previous) : seed.previous));
   }
   const int levels = stream.from_prediction ? config_.prior_levels : config_.levels;
-  const auto found = LucasKanade{.window_px = config_.window_px, .levels = levels}(
+  // The pyramids' margins are as wide as the wider window.
+  const int window_px = stream.from_prediction
+                            ? std::min(config_.prior_window_px, config_.window_px)
+                            : config_.window_px;
+  const auto found = LucasKanade{.window_px = window_px, .levels = levels}(
       stream.previous, stream.current, from, to);
 
   std::vector<std::size_t> doubtful;

@@ -34,7 +34,9 @@ struct FeatureConfig {
 
 /// Pyramidal Lucas-Kanade (IV-A).
 struct FlowConfig {
-  int window_px = 21;    ///< side of the window [px]
+  int window_px = 21;  ///< side of the window [px]
+  /// The same of the 3D-to-2D stream, which begins near: less of what lies at another depth.
+  int prior_window_px = 15;
   int prior_levels = 1;  ///< coarsest level of the 3D-to-2D stream, whose start is predicted
   int levels = 3;        ///< coarsest level of the 2D-to-2D stream
   double forward_backward_px = 0.7;       ///< a track must return to its start within this [px]
