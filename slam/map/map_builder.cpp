@@ -23,6 +23,7 @@
 
 #include "cloud/gicp.hpp"
 #include "map/ids.hpp"
+#include "map/local_map.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
 #include "map/overlap.hpp"
@@ -185,8 +186,10 @@ std::vector<std::pair<KeyframeId, KeyframeId>> MapBuilder::edges_to_measure(
     const bool consecutive = std::next(map.keyframes().find(id)) == map.keyframes().find(newest);
     return config_.switches.depth_to_map || (config_.switches.gicp && consecutive);
   };
-  std::erase_if(overlapping,
-                [&](const OverlappingKeyframe& k) { return k.id == newest || !wanted(k.id); });
+  const LocalMap local{map, newest};
+  std::erase_if(overlapping, [&](const OverlappingKeyframe& k) {
+    return k.id == newest || !local.contains(k.id) || !wanted(k.id);
+  });
   std::vector<std::pair<KeyframeId, KeyframeId>> edges;
   for (const KeyframeId id : registration_targets(
            overlapping, static_cast<std::size_t>(config_.mapping.map_neighbours))) {

@@ -24,6 +24,7 @@
 #include "cloud/gicp.hpp"
 #include "cloud/gicp_search.hpp"
 #include "map/ids.hpp"
+#include "map/local_map.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"
@@ -289,7 +290,7 @@ Tracker::InitialPose Tracker::first_guess(const Map& map, const InitialPose& pre
 }
 
 std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odom_cam, bool blind,
-                                                double& overlap) const {
+                                                double& overlap) {
   std::vector<DepthTarget> targets;
   if (!current_.cloud) {
     return targets;
@@ -300,7 +301,12 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   if (!current_.anchored) {
     return targets;
   }
-  const auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kTargetOverlap);
+  auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kTargetOverlap);
+  if (const KeyframeId newest = map.keyframes().rbegin()->first;
+      !local_map_ || local_map_->newest() != newest) {
+    local_map_.emplace(map, newest);
+  }
+  std::erase_if(overlapping, [&](const auto& k) { return !local_map_->contains(k.id); });
   overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
   if (config_.switches.depth_to_map) {
     for (const KeyframeId id :

@@ -13,6 +13,7 @@
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/depth_cloud.hpp"
+#include "map/local_map.hpp"
 #include "map/map.hpp"
 #include "odometry/frame.hpp"
 #include "odometry/motion_model.hpp"
@@ -80,10 +81,10 @@ class Tracker {
   /// of the map points in view.
   [[nodiscard]] std::optional<SE3> relocate(const Map& map, const SE3& T_odom_cam_predicted);
   /// What the frame's depth is registered to at a pose: the frame before (GICP between consecutive
-  /// frames), unless `blind` to the motion since, and keyframes (depth to map); `overlap` as in
-  /// TrackingResult.
+  /// frames), unless `blind` to the motion since, and keyframes of the local map (depth to map);
+  /// `overlap` as in TrackingResult.
   [[nodiscard]] std::vector<DepthTarget> depth_targets(const Map& map, const SE3& T_odom_cam,
-                                                       bool blind, double& overlap) const;
+                                                       bool blind, double& overlap);
   /// The frame's features that show map points, and, where asked for, which features they are.
   [[nodiscard]] std::vector<VisualMatch> matches(
       const Map& map, std::vector<std::size_t>* feature_of_match = nullptr) const;
@@ -105,6 +106,7 @@ class Tracker {
   Relocaliser relocaliser_;
   std::shared_ptr<const CellGrid> grid_;
   StageObserver* observer_;
+  std::optional<LocalMap> local_map_;  ///< of the newest keyframe
   Frame previous_;
   Frame current_;
   tbb::task_group cloud_building_;  ///< of the current frame

@@ -18,6 +18,7 @@
 
 #include "cloud/gicp.hpp"
 #include "map/ids.hpp"
+#include "map/local_map.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/pose_optimiser.hpp"
@@ -31,14 +32,8 @@
 namespace geoflow::slam {
 namespace {
 
-/// Keyframes so close in time are no loop.
-constexpr std::uint32_t kRecent = 20;
-/// A keyframe's link with the past is that of the last few, for it is tied to these.
-constexpr std::uint32_t kTied = 5;
-/// Keyframes are linked by so many common points, as many as make a visual fix; and with their
-/// neighbours, which see the same.
-constexpr int kLinkingPoints = 15;
-constexpr std::uint32_t kNeighbours = 10;
+/// A keyframe must look like one of those at most so many before it.
+constexpr std::uint32_t kBefore = 5;
 /// Candidates compared, one for each stretch of so many keyframes.
 constexpr std::size_t kCandidates = 3;
 constexpr std::uint32_t kStretch = 3;
@@ -49,15 +44,18 @@ constexpr double kLeastAlike = 0.15;
 constexpr PnpEffort kHypothesis{.least_inliers = 12, .least_inlier_share = 0.25, .iterations = 400};
 /// With it, features are looked for so far from where it puts them [px].
 constexpr double kGuidedPx = 10;
-/// So many have to agree with the refined pose, and this share of those found near it; more where
-/// the depth of one view is gone; and beyond doubt with still more.
+/// So many have to agree with the refined pose, and this share of those found near it; fewer where
+/// odometry expects the view, more where the depth of one is gone; and beyond doubt with still
+/// more.
 constexpr std::uint32_t kInliers = 30;
+constexpr std::uint32_t kFewInliers = 15;
 constexpr std::uint32_t kInliersWithoutDepth = 60;
 constexpr std::uint32_t kInliersBeyondDoubt = 120;
 constexpr double kInlierShare = 0.5;
 /// The depth seen in both views, as a share of each; and of that, what lies on one surface.
 constexpr double kSeen = 0.3;
 constexpr double kAgreeing = 0.85;
+constexpr double kAgreeingWithFew = 0.9;
 constexpr double kSeenBeyondDoubt = 0.5;
 constexpr double kAgreeingBeyondDoubt = 0.95;
 /// A pose less certain than this leaves a direction open (standard deviations).
@@ -75,6 +73,17 @@ constexpr double kDriftMPerM = 0.05;
 constexpr double kDriftRad = 0.15;
 constexpr double kDriftRadPerM = 0.02;
 
+/// What calibration and the sensor's own distortion leave of the pose between two views, however
+/// many points and surfaces agree.
+Matrix6d of_two_views() {
+  constexpr double kSigmaM = 0.01;
+  constexpr double kSigmaRad = 0.005;
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(kSigmaRad * kSigmaRad);
+  covariance.diagonal().tail<3>().setConstant(kSigmaM * kSigmaM);
+  return covariance;
+}
+
 /// Compares one new view with old ones.
 class Verifier {
  public:
@@ -84,12 +93,9 @@ class Verifier {
         optimiser_{problem.config.pose, problem.config.mapping, problem.gicp, camera_} {}
 
   [[nodiscard]] std::optional<LoopHypothesis> compare(const LoopView& old) const {
-    const auto start = solve_pnp(pairs(old), camera_, problem_.config.pose, kHypothesis);
-    if (!start) {
-      return std::nullopt;
-    }
     // The old camera's frame stands where PnP and optimiser have odom.
-    const SE3 T_old_new = registered(old, start->T_odom_cam);
+    const auto start = solve_pnp(pairs(old), camera_, problem_.config.pose, kHypothesis);
+    const SE3 T_old_new = registered(old, start ? start->T_odom_cam : old.T_this_new);
     const std::vector<VisualMatch> matches = guided(old, T_old_new);
     std::vector<DepthTarget> targets;
     const bool depth = problem_.newest.cloud && old.cloud;
@@ -104,27 +110,39 @@ class Verifier {
                                                     .prior = prior},
                                                    T_old_new);
     const Vector6d variance = solution.covariance.diagonal();
-    const double share = static_cast<double>(solution.visual_inliers) /
-                         std::max(1.0, static_cast<double>(matches.size()));
-    if (share < kInlierShare || variance.head<3>().maxCoeff() > kOpenRad * kOpenRad ||
-        variance.tail<3>().maxCoeff() > kOpenM * kOpenM ||
-        solution.visual_inliers < (depth ? kInliers : kInliersWithoutDepth)) {
+    if (variance.head<3>().maxCoeff() > kOpenRad * kOpenRad ||
+        variance.tail<3>().maxCoeff() > kOpenM * kOpenM) {
       return std::nullopt;
     }
     const SE3& T_old_new1 = solution.T_odom_cam;  // frames: the old camera stands for odom
-    if (depth && !agrees(old, T_old_new1, kSeen, kAgreeing)) {
+    if (depth ? !agrees(old, T_old_new1, kSeen, agreement_needed(solution, matches.size()))
+              : !seen(solution, matches.size(), kInliersWithoutDepth)) {
       return std::nullopt;
     }
     return LoopHypothesis{
         .edge = {.from = old.id,
                  .to = problem_.newest.id,
                  .T_from_to = T_old_new1,
-                 .information = solution.covariance.inverse()},
+                 .information = (solution.covariance + of_two_views()).inverse()},
         .certain = depth && solution.visual_inliers >= kInliersBeyondDoubt &&
                    agrees(old, T_old_new1, kSeenBeyondDoubt, kAgreeingBeyondDoubt)};
   }
 
  private:
+  [[nodiscard]] static bool seen(const PoseSolution& solution, std::size_t matches,
+                                 std::uint32_t least) {
+    return solution.visual_inliers >= least && static_cast<double>(solution.visual_inliers) >=
+                                                   kInlierShare * static_cast<double>(matches);
+  }
+
+  /// The fewer points agree, the more of the depth has to.
+  [[nodiscard]] static double agreement_needed(const PoseSolution& solution, std::size_t matches) {
+    if (seen(solution, matches, kInliers)) {
+      return kAgreeing;
+    }
+    return seen(solution, matches, kFewInliers) ? kAgreeingWithFew : kAgreeingBeyondDoubt;
+  }
+
   [[nodiscard]] VisualMatch match(const LoopView& old, std::size_t in_new,
                                   std::size_t in_old) const {
     const PlaceView& seen = *problem_.newest.place;
@@ -195,35 +213,14 @@ class Verifier {
   PoseOptimiser optimiser_;
 };
 
-/// Keyframes that hang together with one of the newest few, by points or edges.
-std::set<KeyframeId> linked(const Map& map, KeyframeId newest) {
-  std::map<KeyframeId, int> common;
-  const auto tied = [&](KeyframeId id) { return ids_apart(id, newest) < kTied && id <= newest; };
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
-    for (const PointId point : tied(it->first) ? it->second.points : std::vector<PointId>{}) {
-      for (const Observation& observation : map.find_point(point)->observations) {
-        ++common[observation.keyframe];
-      }
-    }
-  }
-  std::set<KeyframeId> found;
-  for (const auto& [id, points] : common) {
-    if (points >= kLinkingPoints) {
-      found.insert(id);
-    }
-  }
-  for (const RelativeEdge& edge : map.edges()) {
-    if (tied(edge.from) || tied(edge.to)) {
-      found.insert(edge.from);
-      found.insert(edge.to);
-    }
-  }
-  return found;
-}
-
-LoopView view_of(const Map& map, KeyframeId id) {
+LoopView view_of(const Map& map, KeyframeId id, KeyframeId newest) {
   const Keyframe& keyframe = map.keyframe(id);
-  return {.id = id, .place = keyframe.place, .cloud = keyframe.cloud};
+  const SE3& T_odom_this = keyframe.T_odom_cam;
+  const SE3& T_odom_new = map.keyframe(newest).T_odom_cam;
+  return {.id = id,
+          .place = keyframe.place,
+          .cloud = keyframe.cloud,
+          .T_this_new = T_odom_this.inverse() * T_odom_new};
 }
 
 /// Length of the way between two keyframes [m].
@@ -234,6 +231,48 @@ double way_between(const Map& map, KeyframeId from, KeyframeId to) {
     way_m += (next->second.T_odom_cam.translation() - it->second.T_odom_cam.translation()).norm();
   }
   return way_m;
+}
+
+/// Old keyframes that look like the newest one.
+std::vector<KeyframeId> alike(const Map& map, const LocalMap& local) {
+  const KeyframeId newest = local.newest();
+  std::vector<PlaceCandidate> ranking =
+      map.places().query(*map.keyframe(newest).place, map.places().size());
+  double as_before = 0;  // the best of the keyframes that must look alike
+  for (const PlaceCandidate& candidate : ranking) {
+    if (candidate.keyframe != newest && ids_apart(candidate.keyframe, newest) <= kBefore) {
+      as_before = std::max(as_before, candidate.score);
+    }
+  }
+  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
+    return candidate.keyframe > newest || candidate.score < kLeastAlike * as_before ||
+           local.contains(candidate.keyframe);
+  });
+  std::vector<KeyframeId> found;
+  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
+    found.push_back(candidate.keyframe);
+  }
+  return found;
+}
+
+/// Old keyframes whose depth the newest one should see, going by the way between.
+std::vector<KeyframeId> overlapping(const Map& map, const LocalMap& local) {
+  const Keyframe& newest = map.keyframe(local.newest());
+  if (!newest.cloud) {
+    return {};
+  }
+  std::vector<PlaceCandidate> ranking;
+  for (const auto& [id, overlap] :
+       overlapping_keyframes(map, *newest.cloud, newest.T_odom_cam, kSeen)) {
+    if (!local.contains(id)) {
+      ranking.push_back({.keyframe = id, .score = overlap});
+    }
+  }
+  std::vector<KeyframeId> found;
+  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
+    found.push_back(candidate.keyframe);
+  }
+  return found;
 }
 
 /// What a loop says of where its new keyframe is.
@@ -279,31 +318,18 @@ std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeI
   if (!map.keyframe(newest).place) {
     return nullptr;
   }
-  std::vector<PlaceCandidate> ranking =
-      map.places().query(*map.keyframe(newest).place, map.places().size());
-  double alike = 0;  // the best of the keyframes that must look alike
-  for (const PlaceCandidate& candidate : ranking) {
-    if (candidate.keyframe != newest && ids_apart(candidate.keyframe, newest) <= kTied) {
-      alike = std::max(alike, candidate.score);
+  const LocalMap local{map, newest};
+  auto problem = std::make_shared<LoopProblem>();
+  std::vector<KeyframeId> candidates = alike(map, local);
+  for (const KeyframeId id : overlapping(map, local)) {
+    if (std::ranges::find(candidates, id) == candidates.end()) {
+      candidates.push_back(id);
     }
   }
-  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
-    return candidate.keyframe > newest || ids_apart(candidate.keyframe, newest) <= kRecent ||
-           candidate.score < kLeastAlike * alike;
-  });
-  if (ranking.empty()) {
-    return nullptr;
+  for (const KeyframeId id : candidates) {
+    problem->candidates.push_back(view_of(map, id, newest));
   }
-  const std::set<KeyframeId> links = linked(map, newest);
-  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
-    return std::ranges::any_of(
-        links, [&](KeyframeId id) { return ids_apart(id, candidate.keyframe) <= kNeighbours; });
-  });
-  auto problem = std::make_shared<LoopProblem>();
-  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
-    problem->candidates.push_back(view_of(map, candidate.keyframe));
-  }
-  problem->newest = view_of(map, newest);
+  problem->newest = view_of(map, newest, newest);
   problem->camera = camera_;
   problem->config = config_;
   problem->gicp = gicp_;

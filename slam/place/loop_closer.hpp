@@ -14,9 +14,10 @@
 namespace geoflow::slam {
 
 /// Whether two views show one place, and the relative pose then: pairs of descriptors give a pose
-/// by P3P with RANSAC on the old view's depth, which guides the search for more pairs; generalised
-/// ICP and the pairs refine it together; and enough pairs have to agree, the depth of each view has
-/// to lie on the other's surfaces, and no direction may be left open. Pure, deterministic,
+/// by P3P with RANSAC on the old view's depth, or else odometry does, which guides the search for
+/// more pairs; generalised ICP and the pairs refine it together; and the depth of each view has to
+/// lie on the other's surfaces, beyond doubt where not enough pairs agree, and no direction may be
+/// left open. Pure, deterministic,
 /// thread-safe.
 [[nodiscard]] LoopSolution verify_loops(const LoopProblem& problem);
 
@@ -29,8 +30,8 @@ class LoopCloser {
   LoopCloser(const Config& config, const GicpConfig& gicp, const Calibration& calibration)
       : config_{config}, gicp_{gicp}, camera_{calibration.camera} {}
 
-  /// Old keyframes that look like a new one and are not linked with it by points or edges. Null:
-  /// none, or the keyframe has no place yet.
+  /// Old keyframes that look like a new one, or whose depth it should see where odometry puts it,
+  /// and that are not of its LocalMap. Null: none, or the keyframe has no place yet.
   [[nodiscard]] std::shared_ptr<const LoopProblem> problem(const Map& map, KeyframeId newest) const;
 
   /// Takes in what verify_loops() found, in order of keyframes, and returns the loops that are now

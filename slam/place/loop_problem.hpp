@@ -16,14 +16,15 @@
 /// it can run in any thread.
 namespace geoflow::slam {
 
-/// What a keyframe saw, without where it was.
+/// What a keyframe saw.
 struct LoopView {
   KeyframeId id{};
   std::shared_ptr<const PlaceView> place;
   std::shared_ptr<const DepthCloud> cloud;  ///< null: none, or let go
+  SE3 T_this_new;                           ///< where odometry has the new one, seen from it
 };
 
-/// A keyframe and old ones that look like it.
+/// A keyframe and old ones that look like it or should see the same.
 struct LoopProblem {
   LoopView newest;
   std::vector<LoopView> candidates;
