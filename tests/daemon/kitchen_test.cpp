@@ -50,7 +50,7 @@ TEST(Kitchen, EveryFrameIsTrackedAndTwoReplaysAreEqualToTheByte) {
        {"live_camera.txt", "live_base.txt", "final_camera.txt", "final_base.txt"}) {
     const std::string text = read_text(directory.path() / "a" / name);
     EXPECT_EQ(text, read_text(directory.path() / "b" / name)) << name;
-    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 401) << name;
+    EXPECT_EQ(std::ranges::count(text, '\n'), 401) << name;
   }
 }
 
@@ -93,7 +93,7 @@ TEST(Kitchen, LiveAtThirtyFramesASecondEveryFrameReachesTheSocketOrIsCounted) {
     ended = std::holds_alternative<PoseClient::Ended>(*received);
   }
   EXPECT_EQ(process.wait(seconds{20}), 0) << process.err();
-  std::sort(latencies_ms.begin(), latencies_ms.end());
+  std::ranges::sort(latencies_ms);
   fmt::print(
       "live: {} poses, {} missed by the client, {} frames dropped, arrival to socket p50 {:.1f} ms "
       "p99 {:.1f} ms "

@@ -88,7 +88,7 @@ TEST_F(PipelineTest, LockStepCountsWhatCannotBeRead) {
       LockStepRunner{run, config_, [&](const SyncedPacket&, const PoseEstimate&) { ++frames; }}.run(
           std::stop_token{})));
   EXPECT_EQ(run.statistics->counters.rejected.load(), 1U);
-  EXPECT_EQ(frames, static_cast<std::size_t>(recording_.frames - 1));
+  EXPECT_EQ(frames, static_cast<std::size_t>(recording_.frames) - 1);
 }
 
 TEST_F(PipelineTest, LiveAccountsForEveryFrameAndEndsOnce) {

@@ -1,4 +1,5 @@
 /* A client in C11 with nothing but the protocol's header. */
+#include <stddef.h>
 #include <string.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"

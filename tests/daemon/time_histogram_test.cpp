@@ -33,7 +33,7 @@ TEST(TimeHistogram, PercentilesAreWithinThreePercentOfTheSorted) {
     values.push_back(to_seconds(duration) * 1e3);
     sum += values.back();
   }
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const TimeSummary summary = histogram.summary();
   EXPECT_EQ(summary.count, values.size());
   EXPECT_NEAR(summary.mean_ms, sum / 20000.0, 1e-6) << seed;

@@ -41,11 +41,11 @@ void read_everything(const std::filesystem::path& path) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const std::filesystem::path kPath = scratch_file();
+  static const std::filesystem::path scratch = scratch_file();
   const std::string bytes{data, data + size};
-  std::ofstream{kPath, std::ios::binary} << bytes;
-  read_everything(kPath);
-  if (auto reader = bag::open(kPath, {})) {
+  std::ofstream{scratch, std::ios::binary} << bytes;
+  read_everything(scratch);
+  if (auto reader = bag::open(scratch, {})) {
     for (auto event = (*reader)->next(); !event || *event; event = (*reader)->next()) {
     }
   }

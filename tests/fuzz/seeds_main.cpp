@@ -13,9 +13,7 @@
 /// and over seeds with some bytes changed. It passes by not crashing. Usage: NAME_fuzz
 /// [SEEDS_FOLDER]
 
-extern "C" int LLVMFuzzerTestOneInput(
-    const std::uint8_t* data,
-    std::size_t size);  // NOLINT(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
 

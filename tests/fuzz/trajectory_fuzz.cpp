@@ -11,9 +11,8 @@
 /// aligned by scale.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace geoflow::tools;
-  const std::string_view text{
-      reinterpret_cast<const char*>(data),
-      size};  // NOLINT(cppcoreguidelines-pro-type-reinterpret-cast): bytes as text
+  const void* generic = data;
+  const std::string_view text{static_cast<const char*>(generic), size};
   for (const auto format :
        {std::optional<TrajectoryFormat>{}, std::optional{TrajectoryFormat::kTum},
         std::optional{TrajectoryFormat::kKitti}, std::optional{TrajectoryFormat::kEuroc}}) {

@@ -129,9 +129,11 @@ TEST(DamagedBag, CompressedFileLeavesNothingBehind) {
   SmallBag{}.write(plain);
   const auto path = folder.path() / "bag.db3.zstd";
   write_file(path, test::zstd(read_file(plain)));
+  // NOLINTBEGIN(concurrency-mt-unsafe): this test has no other thread
   ::setenv("TMPDIR", scratch.path().c_str(), 1);
   EXPECT_EQ(read_all(path).data.size(), 20U);
   ::unsetenv("TMPDIR");
+  // NOLINTEND(concurrency-mt-unsafe)
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 

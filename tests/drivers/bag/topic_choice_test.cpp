@@ -28,11 +28,11 @@ BagTopic compressed(std::string name) {
   return topic(std::move(name), ros::CompressedImage::kType);
 }
 
-const BagTopic kDepth = image("/camera/aligned_depth_to_color/image_raw");
+const BagTopic aligned_depth = image("/camera/aligned_depth_to_color/image_raw");
 
 TEST(TopicChoice, NamesOfThePapersBagsAreTheDefault) {
   const auto choice = bag::choose_topics(
-      {image("/camera/color/image_raw"), kDepth,
+      {image("/camera/color/image_raw"), aligned_depth,
        topic("/camera/color/camera_info", ros::CameraInfo::kType),
        topic("/camera/imu", ros::Imu::kType), topic("/dog_imu", ros::Imu::kType),
        topic("/joint_foot", ros::JointState::kType), topic("/robot_odom", ros::Odometry::kType)},
@@ -75,15 +75,16 @@ TEST(TopicChoice, OtherCamerasAndCompressedTransportsAreFound) {
 
 TEST(TopicChoice, SeveralCandidatesAreAnErrorThatNamesThem) {
   const auto choice = bag::choose_topics(
-      {image("/left/color/image_raw"), image("/right/color/image_raw"), kDepth}, {});
+      {image("/left/color/image_raw"), image("/right/color/image_raw"), aligned_depth}, {});
   ASSERT_FALSE(choice);
   EXPECT_THAT(choice.error().message, HasSubstr("/left/color/image_raw"));
   EXPECT_THAT(choice.error().message, HasSubstr("/right/color/image_raw"));
 }
 
 TEST(TopicChoice, NameWithAnotherTypeIsAnError) {
-  const auto choice = bag::choose_topics(
-      {image("/camera/color/image_raw"), kDepth, topic("/camera/imu", "std_msgs/msg/String")}, {});
+  const auto choice = bag::choose_topics({image("/camera/color/image_raw"), aligned_depth,
+                                          topic("/camera/imu", "std_msgs/msg/String")},
+                                         {});
   ASSERT_FALSE(choice);
   EXPECT_EQ(choice.error().message,
             "topic /camera/imu is of type std_msgs/msg/String, but the camera's IMU must be "
@@ -102,7 +103,8 @@ TEST(TopicChoice, EmptyNameIsNotWanted) {
   TopicNames names;
   names.imu = "";
   const auto choice = bag::choose_topics(
-      {image("/camera/color/image_raw"), kDepth, topic("/camera/imu", ros::Imu::kType)}, names);
+      {image("/camera/color/image_raw"), aligned_depth, topic("/camera/imu", ros::Imu::kType)},
+      names);
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->imu, "");
 }

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +14,7 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 
+#include "cloud/cell_grid.hpp"
 #include "cloud/pixel_depth.hpp"
 #include "synthetic_scene.hpp"
 
@@ -41,8 +41,8 @@ void expect_on_scene(const DepthCloud& cloud, const Scene& scene, double distanc
     const auto off = [&](const Face& face) {
       return std::abs(face.normal.dot(surfel.point.cast<double>()) - face.offset);
     };
-    const auto face = std::min_element(
-        scene.begin(), scene.end(), [&](const Face& a, const Face& b) { return off(a) < off(b); });
+    const auto face = std::ranges::min_element(
+        scene, [&](const Face& a, const Face& b) { return off(a) < off(b); });
     EXPECT_LT(off(*face), distance_m) << "cell " << cell;
     const double cosine = std::abs(face->normal.dot(surfel.normal.cast<double>()));
     EXPECT_GT(cosine, std::cos(angle_rad)) << "cell " << cell;

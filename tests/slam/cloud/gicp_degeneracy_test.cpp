@@ -6,6 +6,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/gicp.hpp"
+#include "synthetic_scene.hpp"
 #include "views.hpp"
 
 /// Scenes that leave directions of motion open: they must be named, kept at the guess and given no

@@ -11,6 +11,8 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "cloud/depth_cloud.hpp"
+#include "synthetic_scene.hpp"
 #include "views.hpp"
 
 namespace geoflow::slam {
@@ -63,17 +65,17 @@ TEST(Gicp, SystemIsTheDerivativeOfTheCost) {
   const SE3 T = T_true * motion({0.002, -0.001, 0.001}, {0.003, 0.002, -0.002});
   const NormalEquations system = linearise(source, target, T, config);
   Vector6d numeric;
-  Matrix6d numeric_H;
+  Matrix6d H_numeric;
   for (int i = 0; i < 6; ++i) {
     constexpr double kStep = 2e-4;
     const Vector6d step = kStep * Vector6d::Unit(i);
     const NormalEquations plus = linearise(source, target, T * SE3::exp(step), config);
     const NormalEquations minus = linearise(source, target, T * SE3::exp(-step), config);
     numeric[i] = (plus.cost - minus.cost) / (2 * kStep);
-    numeric_H.col(i) = (plus.b - minus.b) / (2 * kStep);
+    H_numeric.col(i) = (plus.b - minus.b) / (2 * kStep);
   }
   EXPECT_LT((numeric - system.b).norm(), 0.05 * system.b.norm());
-  EXPECT_LT((numeric_H - system.H).norm(), 0.05 * system.H.norm());
+  EXPECT_LT((H_numeric - system.H).norm(), 0.05 * system.H.norm());
 }
 
 TEST(Gicp, SystemsAddUp) {

@@ -14,6 +14,8 @@
 #include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"
 
+#include "cloud/cell_grid.hpp"
+#include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
 
 /// Real depth: kitchen-400 (7-Scenes RedKitchen, Kinect) against its reference, which is good to
@@ -40,7 +42,7 @@ class DepthClouds : public CameraSink {
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
+  std::ranges::nth_element(values, middle);
   return *middle;
 }
 

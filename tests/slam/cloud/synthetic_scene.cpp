@@ -53,14 +53,21 @@ Vector3d ray_of(const CameraIntrinsics& camera, double u, double v) {
   return ray.homogeneous();
 }
 
+/// Of a pixel in row order.
+std::size_t index_of(const CameraIntrinsics& camera, int u, int v) {
+  return static_cast<std::size_t>(v) * static_cast<std::size_t>(camera.width) +
+         static_cast<std::size_t>(u);
+}
+
 /// White noise averaged over squares, at the given standard deviation after averaging.
 std::vector<double> noise_image(const CameraIntrinsics& camera, const DepthNoise& noise,
                                 std::mt19937_64& random) {
-  const auto size = static_cast<std::size_t>(camera.width * camera.height);
+  const auto size =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   std::vector<double> white(size);
   const double sigma = noise.inverse_depth_sigma * noise.blur_px;  // may be 0
   std::normal_distribution<double> normal;
-  std::generate(white.begin(), white.end(), [&] { return sigma * normal(random); });
+  std::ranges::generate(white, [&] { return sigma * normal(random); });
   if (noise.blur_px == 1) {
     return white;
   }
@@ -71,10 +78,9 @@ std::vector<double> noise_image(const CameraIntrinsics& camera, const DepthNoise
       for (int i = 0; i < noise.blur_px * noise.blur_px; ++i) {
         const int row = std::min(v + i / noise.blur_px, camera.height - 1);
         const int column = std::min(u + i % noise.blur_px, camera.width - 1);
-        sum += white[static_cast<std::size_t>(row * camera.width + column)];
+        sum += white[index_of(camera, column, row)];
       }
-      blurred[static_cast<std::size_t>(v * camera.width + u)] =
-          sum / (noise.blur_px * noise.blur_px);
+      blurred[index_of(camera, u, v)] = sum / (noise.blur_px * noise.blur_px);
     }
   }
   return blurred;
@@ -141,7 +147,7 @@ FrameRef render(const Scene& scene, const SE3& T_world_cam, const CameraIntrinsi
       static_cast<std::uint16_t*>(static_cast<void*>(frame.writable_bytes().data()));
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
-      const auto pixel = static_cast<std::size_t>(v * camera.width + u);
+      const std::size_t pixel = index_of(camera, u, v);
       const double z = depth_along(scene, T_world_cam, ray_of(camera, u, v));
       const double counts = std::isfinite(z) ? 1.0 / (1.0 / z + errors[pixel]) / depth_unit_m : 0.0;
       const bool hole = noise.hole_probability > 0 && chance(random) < noise.hole_probability;

@@ -15,7 +15,6 @@
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
@@ -40,7 +39,7 @@ class StillImu {
   StillImu(std::mt19937_64& random, const BiasPrior& prior, double motors_mps2 = 0)
       : random_{random}, motors_mps2_{motors_mps2} {
     R_odom_imu_ = so3::exp(normal3(random));
-    std::normal_distribution<double> normal;
+    const std::normal_distribution<double> normal;
     const BiasMatrix root = prior.covariance.llt().matrixL();
     Vector6d z;
     z << normal3(random), normal3(random);

@@ -82,7 +82,7 @@ TEST(Preintegration, InterpolatesBothEnds) {
       return s.t > begin - milliseconds{5} && s.t < end + milliseconds{5};
     };
     std::vector<Timed<ImuSample>> packet;
-    std::copy_if(samples.begin(), samples.end(), std::back_inserter(packet), inside);
+    std::ranges::copy_if(samples, std::back_inserter(packet), inside);
     const Preintegrated again = integrated(packet, begin, end);
     EXPECT_EQ(whole.dp, again.dp);
     EXPECT_EQ(whole.covariance, again.covariance);

@@ -71,7 +71,7 @@ TEST(Contact, SupportIsJudgedByTheWeightWhateverTheMass) {
 
 TEST(Contact, MovingFeetDoNotStandUnlessAllForcesSaySo) {
   ContactEstimator contact;
-  Evidence still{FootEvidence{}, FootEvidence{}, FootEvidence{}, FootEvidence{}};
+  const Evidence still{FootEvidence{}, FootEvidence{}, FootEvidence{}, FootEvidence{}};
   contact.update(still, kStep);
   EXPECT_TRUE(contact.feet()[2].stands);
   Evidence moving = still;

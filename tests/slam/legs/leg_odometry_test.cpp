@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <ranges>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,6 +20,8 @@
 #include "geoflow/hal/time.hpp"
 #include "tests/support/data.hpp"
 
+#include "legs/leg_config.hpp"
+#include "legs/leg_preintegration.hpp"
 #include "recordings.hpp"
 
 namespace geoflow::slam {
@@ -75,7 +77,7 @@ struct Drift {
   double path_m = 0;
   double end_m = 0;  ///< error of the last position
   double yaw_rad = 0;
-  double share() const { return end_m / path_m; }
+  [[nodiscard]] double share() const { return end_m / path_m; }
 };
 
 double yaw(const SE3& T) {
@@ -99,7 +101,7 @@ Drift drift_since(const WalkRecording& walk, const std::vector<LegEstimate>& est
           .end_m = (moved - truth).norm(),
           .yaw_rad = std::remainder((yaw(last.T_odom_base) - yaw(first->T_odom_base)) -
                                         (yaw(T_world_end) - yaw(T_world_start)),
-                                    2 * M_PI)};
+                                    2 * std::numbers::pi)};
 }
 
 void record(const std::string& name, const Drift& drift) {
@@ -109,11 +111,11 @@ void record(const std::string& name, const Drift& drift) {
   testing::Test::RecordProperty(name + "_yaw_rad", std::to_string(drift.yaw_rad));
 }
 
-const std::vector<std::string> kTrots{"trot_v0.3_T0.5_d0.6.csv", "trot_v0.5_T0.5_d0.55.csv"};
+const std::vector<std::string> trots{"trot_v0.3_T0.5_d0.6.csv", "trot_v0.5_T0.5_d0.55.csv"};
 
 TEST(LegOdometry, ASimulatedTrotDriftsByLessThanOneAndAHalfPercent) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  for (const std::string& name : kTrots) {
+  for (const std::string& name : trots) {
     const WalkRecording walk = tests::read_go2_trot(folder / name);
     const Drift drift = drift_since(walk, run(go2(), walk), at_seconds(2.5));
     record(name, drift);
@@ -125,7 +127,7 @@ TEST(LegOdometry, ARollingFootIsNotAPinnedOne) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
   LegConfig pinned = go2();
   pinned.rolling = 0;
-  const WalkRecording walk = tests::read_go2_trot(folder / kTrots[1]);
+  const WalkRecording walk = tests::read_go2_trot(folder / trots[1]);
   const Drift drift = drift_since(walk, run(pinned, walk), at_seconds(2.5));
   record("pinned", drift);
   EXPECT_GT(drift.share(), 0.03);
@@ -136,7 +138,7 @@ TEST(LegOdometry, ARollingFootIsNotAPinnedOne) {
 /// out may cost.
 TEST(LegOdometry, WorksWithWhatSensorsThereAre) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  for (const std::string& name : kTrots) {
+  for (const std::string& name : trots) {
     for (const bool torques : {false, true}) {
       for (const bool forces : {false, true}) {
         WalkRecording walk = tests::read_go2_trot(folder / name);
@@ -178,7 +180,7 @@ TEST(LegOdometry, ARealWalkDriftsByLessThanTwoPercent) {
 
 TEST(LegOdometry, TheSameSamplesGiveTheSameBits) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  const WalkRecording walk = tests::read_go2_trot(folder / kTrots[0]);
+  const WalkRecording walk = tests::read_go2_trot(folder / trots[0]);
   const std::vector<LegEstimate> once = run(go2(), walk);
   const std::vector<LegEstimate> again = run(go2(), walk);
   ASSERT_EQ(once.size(), again.size());
@@ -188,7 +190,7 @@ TEST(LegOdometry, TheSameSamplesGiveTheSameBits) {
 
 TEST(LegOdometry, HowSamplesArePackedDoesNotMatter) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  const WalkRecording walk = tests::read_go2_trot(folder / kTrots[0]);
+  const WalkRecording walk = tests::read_go2_trot(folder / trots[0]);
   const LegEstimate coarse = run(go2(), walk, milliseconds{100}).back();
   const std::vector<LegEstimate> fine = run(go2(), walk, milliseconds{20});
   const auto same = std::ranges::find(fine, coarse.t, &LegEstimate::t);
@@ -201,7 +203,7 @@ TEST(LegOdometry, HowSamplesArePackedDoesNotMatter) {
 /// A Go1 publishes each state ten times (unitree_ros_to_real, issue 48).
 TEST(LegOdometry, RepeatedSamplesAreCountedAndNotBelieved) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  WalkRecording walk = tests::read_go2_trot(folder / kTrots[0]);
+  WalkRecording walk = tests::read_go2_trot(folder / trots[0]);
   for (std::size_t k = 0; k < walk.legs.size(); ++k) {
     walk.legs[k].sample = walk.legs[k - k % 10].sample;
   }
@@ -214,7 +216,7 @@ TEST(LegOdometry, RepeatedSamplesAreCountedAndNotBelieved) {
 
 TEST(LegOdometry, SurvivesBrokenSamples) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  WalkRecording walk = tests::read_go2_trot(folder / kTrots[0]);
+  WalkRecording walk = tests::read_go2_trot(folder / trots[0]);
   for (std::size_t k = 0; k < walk.legs.size(); k += 7) {
     walk.legs[k].sample.joints[k % 12].q_rad = std::nan("");
     walk.legs[k].sample.valid[(k + 1) % kLegCount] = false;
@@ -230,7 +232,7 @@ TEST(LegOdometry, SurvivesBrokenSamples) {
 /// that is expected of one.
 TEST(LegOdometry, ARobotsOwnTwistTakesTheLegsPlace) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  WalkRecording walk = tests::read_go2_trot(folder / kTrots[1]);
+  WalkRecording walk = tests::read_go2_trot(folder / trots[1]);
   walk.legs.clear();
   constexpr std::size_t kEvery = 10;  // 50 Hz, a Go2's sportmodestate
   for (std::size_t k = kEvery; k + kEvery < walk.truth.size(); k += kEvery) {
@@ -250,7 +252,7 @@ TEST(LegOdometry, ARobotsOwnTwistTakesTheLegsPlace) {
 /// The factors between frames, against the truth: consistent, and free of the accelerometer.
 TEST(LegOdometry, IncrementsAreConsistentWithTheirCovariance) {
   GEOFLOW_DATA_OR_SKIP(folder, "go2-trot");
-  for (const std::string& name : kTrots) {
+  for (const std::string& name : trots) {
     const WalkRecording walk = tests::read_go2_trot(folder / name);
     const std::vector<LegEstimate> estimates = run(go2(), walk, milliseconds{100});
     double nees = 0;

@@ -18,12 +18,12 @@ namespace geoflow::slam {
 namespace {
 
 const LegConfig& config() {
-  static const LegConfig kConfig = [] {
+  static const LegConfig shared = [] {
     LegConfig made;
     made.T_base_imu = SE3{so3::exp({0.3, -0.2, 1.1}), Vector3d{0.1, 0, 0.05}};
     return made;
   }();
-  return kConfig;
+  return shared;
 }
 
 struct Source {
@@ -36,12 +36,12 @@ struct Source {
 
 constexpr double kStep = 0.002;
 constexpr int kSteps = 100;
-const Vector3d kBias{0.01, -0.02, 0.015};  // of the gyroscope, in imu
+const Vector3d gyro_bias{0.01, -0.02, 0.015};  // of the gyroscope, in imu
 
 /// Half of the velocities depend on the turn as one foot's does.
 struct Motion {
-  std::vector<Vector3d> gyro;      ///< in imu, with kBias
-  std::vector<Vector3d> velocity;  ///< in base, at kBias
+  std::vector<Vector3d> gyro;      ///< in imu, with gyro_bias
+  std::vector<Vector3d> velocity;  ///< in base, at gyro_bias
   Matrix3d by_turn = skew(Vector3d{0.2, 0.1, -0.3});
 };
 
@@ -50,7 +50,7 @@ Motion random_motion(Source& source) {
   const Vector3d turn = source.vector(1);
   const Vector3d velocity = source.vector(0.5);
   for (int k = 0; k < kSteps; ++k) {
-    motion.gyro.push_back(kBias + turn + source.vector(0.1));
+    motion.gyro.emplace_back(gyro_bias + turn + source.vector(0.1));
     motion.velocity.emplace_back(velocity + source.vector(0.05));
   }
   return motion;
@@ -63,7 +63,7 @@ LegIncrement integrate(const Motion& motion, const Vector3d& bias, const Vector3
   for (std::size_t k = 0; k < motion.gyro.size(); ++k) {
     // A larger bias leaves less turn, which changes what a foot says of the velocity.
     const Vector3d v_base =
-        motion.velocity[k] - bias_velocity - motion.by_turn * (R_base_imu * (bias - kBias));
+        motion.velocity[k] - bias_velocity - motion.by_turn * (R_base_imu * (bias - gyro_bias));
     preintegrator.add(
         {.dt_s = kStep,
          .gyro_radps = motion.gyro[k],
@@ -80,16 +80,17 @@ TEST(LegPreintegration, BiasDerivativesAreThoseOfIntegratingAnew) {
   constexpr double kSmall = 1e-6;
   for (int trial = 0; trial < 20; ++trial) {
     const Motion motion = random_motion(source);
-    const LegIncrement at_bias = integrate(motion, kBias, Vector3d::Zero());
+    const LegIncrement at_bias = integrate(motion, gyro_bias, Vector3d::Zero());
     EXPECT_DOUBLE_EQ(at_bias.contact, 0.5);
     for (int axis = 0; axis < 3; ++axis) {
       const Vector3d small = kSmall * Vector3d::Unit(axis);
-      const Vector3d by_gyro = (integrate(motion, kBias + small, Vector3d::Zero()).dp -
-                                integrate(motion, kBias - small, Vector3d::Zero()).dp) /
+      const Vector3d by_gyro = (integrate(motion, gyro_bias + small, Vector3d::Zero()).dp -
+                                integrate(motion, gyro_bias - small, Vector3d::Zero()).dp) /
                                (2 * kSmall);
       EXPECT_LT((by_gyro - at_bias.by_gyro_bias.col(axis)).norm(), 1e-7);
       const Vector3d by_velocity =
-          (integrate(motion, kBias, small).dp - integrate(motion, kBias, -small).dp) / (2 * kSmall);
+          (integrate(motion, gyro_bias, small).dp - integrate(motion, gyro_bias, -small).dp) /
+          (2 * kSmall);
       EXPECT_LT((by_velocity - at_bias.by_velocity_bias.col(axis)).norm(), 1e-7);
     }
   }
@@ -97,13 +98,13 @@ TEST(LegPreintegration, BiasDerivativesAreThoseOfIntegratingAnew) {
 
 TEST(LegPreintegration, ResidualsDerivativesAreThoseOfDifferences) {
   Source source{.random = std::mt19937_64{tests::test_seed(42)}, .normal = {}};
-  const LegIncrement measured = integrate(random_motion(source), kBias, Vector3d::Zero());
+  const LegIncrement measured = integrate(random_motion(source), gyro_bias, Vector3d::Zero());
   const auto random_pose = [&] { return SE3{so3::exp(source.vector(1)), source.vector(2)}; };
   constexpr double kSmall = 1e-6;
   for (int trial = 0; trial < 20; ++trial) {
     const SE3 T_odom_base0 = random_pose();
     const SE3 T_odom_base1 = random_pose();
-    const Vector3d bias = kBias + source.vector(0.01);
+    const Vector3d bias = gyro_bias + source.vector(0.01);
     const Vector3d drift = source.vector(0.05);
     const LegResidual residual = leg_residual(measured, T_odom_base0, T_odom_base1, bias, drift);
     const auto slope = [&](const auto& residual_at) {
@@ -140,7 +141,7 @@ TEST(LegPreintegration, ResidualsDerivativesAreThoseOfDifferences) {
 TEST(LegPreintegration, CovarianceIsConsistent) {
   Source source{.random = std::mt19937_64{tests::test_seed(43)}, .normal = {}};
   const Motion truth = random_motion(source);
-  const LegIncrement exact = integrate(truth, kBias, Vector3d::Zero());
+  const LegIncrement exact = integrate(truth, gyro_bias, Vector3d::Zero());
   const double gyro_sigma = config().imu_noise.gyro_noise_density / std::sqrt(kStep);
   const LegNoise& noise = config().noise;
   constexpr int kTrials = 1000;
@@ -155,7 +156,7 @@ TEST(LegPreintegration, CovarianceIsConsistent) {
       noisy.gyro[row] += source.vector(gyro_sigma);
       noisy.velocity[row] += source.vector(std::sqrt(1e-3)) + lasting;
     }
-    const LegIncrement measured = integrate(noisy, kBias, Vector3d::Zero());
+    const LegIncrement measured = integrate(noisy, gyro_bias, Vector3d::Zero());
     const Vector3d error = measured.dp - exact.dp;
     nees += error.dot(measured.covariance.inverse() * error) / 3 / kTrials;
   }

@@ -21,7 +21,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr double kMass = 15.206;  // [kg], Unitree's MJCF of the Go2
-constexpr char kSnapshots[] = "go2_real_standing_and_lying.csv";
+constexpr const char* kSnapshots = "go2_real_standing_and_lying.csv";
 
 void swap_legs(LegSample& sample, std::size_t a, std::size_t b) {
   for (std::size_t joint = 0; joint < kJointsPerLeg; ++joint) {

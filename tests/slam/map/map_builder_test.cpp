@@ -1,19 +1,22 @@
 #include "map/map_builder.hpp"
 
 #include <cstddef>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
+#include "map/mapping_problem.hpp"
 #include "odometry/frame.hpp"
 #include "slam/vision/textured_wall.hpp"
+#include "vision/camera_model.hpp"
 #include "vision/dual_stream_flow.hpp"
 
 /// Keyframes of a textured wall that the camera has no depth of.
@@ -31,6 +34,7 @@ class MapBuilderTest : public testing::Test {
                                                          flow.window_px, flow.levels);
     if (previous != nullptr) {
       std::vector<FlowSeed> seeds;
+      seeds.reserve(previous->features.size());
       for (const Feature& feature : previous->features) {
         seeds.push_back({.previous = feature.raw, .predicted = std::nullopt});
       }

@@ -83,7 +83,7 @@ class Walked {
     double worst_m = 0;           ///< largest error of translation over a frame
   };
 
-  Account reckon(const Switches& switches, bool legs, bool twist) const {
+  [[nodiscard]] Account reckon(const Switches& switches, bool legs, bool twist) const {
     DeadReckoner reckoner{switches, calibration};
     Account account;
     HostTime before = at(0);

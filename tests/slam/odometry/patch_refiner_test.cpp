@@ -7,16 +7,19 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/slam/config.hpp"
 
 #include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "slam/vision/textured_wall.hpp"
 #include "vision/dual_stream_flow.hpp"
@@ -38,13 +41,13 @@ class PatchRefinerTest : public testing::Test {
     return {Eigen::Quaterniond{Eigen::AngleAxisd{kTilt, Vector3d::UnitX()}},
             Vector3d{0, -kStepM * steps, 0}};
   }
-  std::shared_ptr<const ImagePyramid> pyramid(int steps) const {
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> pyramid(int steps) const {
     const FlowConfig flow;
     return std::make_shared<const ImagePyramid>(floor_.seen_from(pose(steps)), flow.window_px,
                                                 flow.levels);
   }
   /// Exact depth, as far as `farthest_m`.
-  std::shared_ptr<const DepthCloud> cloud(double farthest_m) const {
+  [[nodiscard]] std::shared_ptr<const DepthCloud> cloud(double farthest_m) const {
     constexpr double kUnitM = 1e-4;
     FramePool pool{1};
     const CameraIntrinsics& k = camera_.intrinsics();
@@ -54,7 +57,8 @@ class PatchRefinerTest : public testing::Test {
       for (int u = 0; u < k.width; ++u) {
         const double z = (T_cam_odom * floor_.point_at(pose(0), Vector2d{u, v})).z();
         const auto count = static_cast<std::uint16_t>(z < farthest_m ? std::lround(z / kUnitM) : 0);
-        const auto index = static_cast<std::size_t>(v * k.width + u) * sizeof(count);
+        const int in_row_order = v * k.width + u;
+        const auto index = static_cast<std::size_t>(in_row_order) * sizeof(count);
         std::memcpy(depth.writable_bytes().subspan(index).data(), &count, sizeof(count));
       }
     }
@@ -84,7 +88,7 @@ class PatchRefinerTest : public testing::Test {
     }
   }
   /// How much of the true motion of the points' images over some frames is measured, 1 if all.
-  double measured_share(bool refined) const {
+  [[nodiscard]] double measured_share(bool refined) const {
     constexpr int kFrames = 6;
     const PatchRefiner refiner{camera_};
     std::vector<std::optional<Vector2d>> at{corners_.begin(), corners_.end()};
@@ -92,8 +96,9 @@ class PatchRefinerTest : public testing::Test {
     for (int i = 1; i <= kFrames; ++i) {
       const auto current = pyramid(i);
       std::vector<FlowSeed> seeds;
-      for (std::size_t k = 0; k < at.size(); ++k) {
-        seeds.push_back({at[k].value_or(Vector2d{0, 0}), std::nullopt});
+      seeds.reserve(at.size());
+      for (const auto& k : at) {
+        seeds.push_back({k.value_or(Vector2d{0, 0}), std::nullopt});
       }
       const auto tracks = DualStreamFlow{{}, camera_}.track(*previous, *current, seeds);
       for (std::size_t k = 0; k < at.size(); ++k) {

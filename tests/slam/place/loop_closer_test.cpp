@@ -10,8 +10,11 @@
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
 #include "tests/support/data.hpp"
 
+#include "cloud/gicp.hpp"
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
 #include "map/map_correction.hpp"

@@ -13,6 +13,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/frame.hpp"

@@ -19,6 +19,9 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
+#include "cloud/cell_grid.hpp"
+#include "odometry/frame.hpp"
+#include "odometry/tracker.hpp"
 #include "vision/place_view.hpp"
 
 namespace geoflow::slam::tests {
@@ -47,12 +50,12 @@ FrameRef mirrored(const FrameRef& frame) {
 /// Keeps all images of a recording: more than its own buffers hold.
 struct Images : CameraSink {
   void on_color(const Arrival<CameraClock, ColorFrame>& frame) override {
-    color.push_back(copied<std::uint8_t>(frame.sample.image, copy));
+    color.push_back(copied<std::uint8_t>(frame.sample.image, kCopy));
   }
   void on_depth(const Arrival<CameraClock, DepthFrame>& frame) override {
-    depth.push_back(copied<std::uint16_t>(frame.sample.image, copy));
+    depth.push_back(copied<std::uint16_t>(frame.sample.image, kCopy));
   }
-  static constexpr auto copy = [](auto* to, const auto* from, int width) {
+  static constexpr auto kCopy = [](auto* to, const auto* from, int width) {
     std::copy(from, from + width, to);
   };
   std::vector<FrameRef> color;

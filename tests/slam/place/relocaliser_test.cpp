@@ -9,7 +9,9 @@
 #include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
+#include "map/map.hpp"
 #include "map/map_builder.hpp"
+#include "odometry/frame.hpp"
 #include "recorded_places.hpp"
 
 /// Places of kitchen-400 (7-Scenes RedKitchen), and their mirror images as places that the map does

@@ -14,6 +14,7 @@
 #include "geoflow/slam/config.hpp"
 
 #include "slam/vision/textured_wall.hpp"
+#include "vision/camera_model.hpp"
 #include "vision/orb_features.hpp"
 
 namespace geoflow::slam {
@@ -41,16 +42,16 @@ TEST(Corners, FillTheGridAndNoCellBeyondItsShare) {
 
 TEST(Corners, AreFoundWhereContrastIsFaintAndOnlyThere) {
   const FeatureConfig config;
-  cv::Mat1b image = TexturedWall{2.0, 1}.seen_from(SE3{});
+  const cv::Mat1b image = TexturedWall{2.0, 1}.seen_from(SE3{});
   const cv::Mat1b left = image(cv::Rect{0, 0, 160, 240});
   left.convertTo(left, CV_8U, 0.15, 110);
   const auto corners = detect_corners(image, config);
-  const auto faint = std::count_if(corners.begin(), corners.end(),
-                                   [](const cv::KeyPoint& corner) { return corner.response < 20; });
+  const auto faint = std::ranges::count_if(
+      corners, [](const cv::KeyPoint& corner) { return corner.response < 20; });
   EXPECT_GT(faint, 10);
-  EXPECT_TRUE(std::is_sorted(
-      corners.begin(), corners.end(),
-      [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; }));
+  EXPECT_TRUE(std::ranges::is_sorted(corners, [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    return a.response > b.response;
+  }));
   for (const cv::KeyPoint& corner : corners) {
     EXPECT_GE(corner.response, static_cast<float>(config.fast_threshold));
   }

@@ -11,6 +11,7 @@
 #include "geoflow/slam/config.hpp"
 
 #include "slam/vision/textured_wall.hpp"
+#include "vision/image_pyramid.hpp"
 #include "vision/orb_features.hpp"
 
 namespace geoflow::slam {
@@ -56,11 +57,12 @@ struct Views {
   std::vector<Vector2d> truth;
 };
 
-const SE3 kStep{Eigen::Quaterniond{Eigen::AngleAxisd{0.02, Vector3d{0.5, -1, 0.3}.normalized()}},
-                Vector3d{0.02, 0.01, 0.03}};
+const SE3 small_step{
+    Eigen::Quaterniond{Eigen::AngleAxisd{0.02, Vector3d{0.5, -1, 0.3}.normalized()}},
+    Vector3d{0.02, 0.01, 0.03}};
 
 TEST(DualStreamFlow, FollowsTheCornersOfAWallToAFractionOfAPixel) {
-  const Views views{kStep};
+  const Views views{small_step};
   ASSERT_GT(views.seeds.size(), 80U);
   const auto [right, all] = views.within(0.3);
   EXPECT_GT(all, views.seeds.size() * 8 / 10);
@@ -86,7 +88,7 @@ TEST(DualStreamFlow, DropsWhatMovesAgainstTheCamera) {
   // Sideways past two depths, which settles the epipolar geometry; the middle of the second view
   // shows something that moved upward on its own.
   const Views views{SE3{Eigen::Quaterniond::Identity(), Vector3d{0.1, 0, 0.02}}, 0.8};
-  cv::Mat1b second = views.wall.seen_from(views.T_odom_b);
+  const cv::Mat1b second = views.wall.seen_from(views.T_odom_b);
   const cv::Rect moving{90, 60, 120, 120};
   const cv::Mat1b elsewhere = second(moving + cv::Point{0, 9}).clone();
   elsewhere.copyTo(second(moving));
@@ -106,7 +108,7 @@ TEST(DualStreamFlow, DropsWhatMovesAgainstTheCamera) {
 }
 
 TEST(DualStreamFlow, LetsNoTwoTracksEndAtOnePlace) {
-  Views views{kStep};
+  Views views{small_step};
   const std::size_t n = views.seeds.size();
   for (std::size_t i = 0; i < n; ++i) {
     views.seeds.push_back(views.seeds[i]);
@@ -119,7 +121,7 @@ TEST(DualStreamFlow, LetsNoTwoTracksEndAtOnePlace) {
 }
 
 TEST(DualStreamFlow, OfNothingIsNothing) {
-  const Views views{kStep};
+  const Views views{small_step};
   EXPECT_TRUE(DualStreamFlow({}, views.camera)
                   .track(views.pyramid(SE3{}), views.pyramid(SE3{}), {})
                   .empty());

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "geoflow/hal/geometry.hpp"
+
 #include "vision/image_pyramid.hpp"
 
 namespace geoflow::slam {

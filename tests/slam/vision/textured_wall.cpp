@@ -1,6 +1,5 @@
 #include "slam/vision/textured_wall.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 

@@ -35,9 +35,9 @@ using testing::IsEmpty;
 
 namespace fs = std::filesystem;
 
-const std::string kFlow = "slam.switches.optical_flow";
-const std::string kGicp = "slam.switches.gicp";
-const std::string kMap = "slam.switches.depth_to_map";
+const std::string flow_key = "slam.switches.optical_flow";
+const std::string gicp_key = "slam.switches.gicp";
+const std::string map_key = "slam.switches.depth_to_map";
 
 std::vector<std::string> names(const AblationRows& rows) {
   std::vector<std::string> all;
@@ -48,23 +48,23 @@ std::vector<std::string> names(const AblationRows& rows) {
 }
 
 TEST(Ablation, RowsFollowTheSwitchesThatThereAre) {
-  const std::vector<std::string> keys = {"slam.pose.iterations", kFlow, kGicp};
+  const std::vector<std::string> keys = {"slam.pose.iterations", flow_key, gicp_key};
   const AblationRows rows = ablation_rows(keys);
   EXPECT_THAT(names(rows), ElementsAre("r", "r+o", "r+i", "r+o+i"));
-  EXPECT_THAT(rows.available[1].settings, ElementsAre(kFlow + "=true", kGicp + "=false"));
-  EXPECT_THAT(rows.left_out, ElementsAre("r+d: this estimator has no switch " + kMap,
-                                         "r+o+i+d: this estimator has no switch " + kMap));
+  EXPECT_THAT(rows.available[1].settings, ElementsAre(flow_key + "=true", gicp_key + "=false"));
+  EXPECT_THAT(rows.left_out, ElementsAre("r+d: this estimator has no switch " + map_key,
+                                         "r+o+i+d: this estimator has no switch " + map_key));
 }
 
 TEST(Ablation, AllRowsWhereAllSwitchesAre) {
-  const std::vector<std::string> keys = {kFlow, kGicp, kMap};
+  const std::vector<std::string> keys = {flow_key, gicp_key, map_key};
   const AblationRows rows = ablation_rows(keys);
   EXPECT_THAT(names(rows), ElementsAre("r", "r+o", "r+i", "r+d", "r+o+i", "r+o+i+d"));
   EXPECT_THAT(rows.left_out, IsEmpty());
   EXPECT_THAT(rows.available[0].settings,
-              ElementsAre(kFlow + "=false", kGicp + "=false", kMap + "=false"));
+              ElementsAre(flow_key + "=false", gicp_key + "=false", map_key + "=false"));
   EXPECT_THAT(rows.available[5].settings,
-              ElementsAre(kFlow + "=true", kGicp + "=true", kMap + "=true"));
+              ElementsAre(flow_key + "=true", gicp_key + "=true", map_key + "=true"));
 }
 
 TEST(Published, SequencesAreFoundByTheirDataSetsNames) {

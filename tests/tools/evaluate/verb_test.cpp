@@ -103,7 +103,7 @@ TEST_F(EvaluateVerbTest, WritesPlotsAndTheTable) {
   EXPECT_THAT(content("a.svg"), HasSubstr("<svg"));
   const std::string csv = content("a.csv");
   EXPECT_THAT(csv, StartsWith("timestamp_ns,estimate_x_m"));
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 41);
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 41);
 }
 
 TEST_F(EvaluateVerbTest, ExitsWithItsDocumentedCodes) {

@@ -23,7 +23,7 @@ namespace {
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
+  std::ranges::nth_element(values, middle);
   return *middle;
 }
 
@@ -153,7 +153,7 @@ TEST(CameraTruth, AFrameWarpedByTheTruePosesIsTheTenthAfterIt) {
   std::cout << "warped over 10 frames: true depth " << truth_mm << " mm, registered depth "
             << measured_mm << " mm, brightness " << 100 * median(brightness) << " %\n";
   EXPECT_LT(truth_mm, 0.5);
-  std::sort(errors.beyond_pixel_m.begin(), errors.beyond_pixel_m.end());
+  std::ranges::sort(errors.beyond_pixel_m);
   const double beyond_mm = 1e3 * errors.beyond_pixel_m[errors.beyond_pixel_m.size() * 3 / 4];
   std::cout << "registered depth beyond what one infrared pixel spans, upper quartile: "
             << beyond_mm << " mm\n";

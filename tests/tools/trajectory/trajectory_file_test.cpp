@@ -166,7 +166,7 @@ TEST(WriteTum, IsReadBackWithExactTimes) {
   for (auto& t : times) {
     t = any_time(random);
   }
-  std::sort(times.begin(), times.end());
+  std::ranges::sort(times);
   Trajectory poses;
   for (const std::int64_t t : times) {
     Vector6d xi;
