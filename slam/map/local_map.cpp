@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
-#include <vector>
 
 #include "map/ids.hpp"
 #include "map/map.hpp"
@@ -25,8 +24,11 @@ constexpr std::uint32_t kNeighbours = 10;
 LocalMap::LocalMap(const Map& map, KeyframeId newest) : newest_{newest} {
   std::map<KeyframeId, int> common;
   const auto tied = [&](KeyframeId id) { return ids_apart(id, newest) < kTied && id <= newest; };
-  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
-    for (const PointId point : tied(it->first) ? it->second.points : std::vector<PointId>{}) {
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (!tied(id)) {
+      continue;
+    }
+    for (const PointId point : keyframe.points) {
       for (const Observation& observation : map.find_point(point)->observations) {
         ++common[observation.keyframe];
       }

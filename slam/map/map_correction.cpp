@@ -21,7 +21,7 @@ constexpr std::uint32_t kLoop = 20;
 /// What odometry leaves of a step between keyframes: standard deviations, of the step and at least.
 constexpr double kOfTheWay = 0.01;
 constexpr double kLeastM = 0.005;
-constexpr double kLeastRad = 0.001;
+constexpr double kLeastRad = 0.003;
 
 Matrix6d information_of_step(const SE3& T_from_to) {
   const Vector6d step = T_from_to.log();

@@ -233,8 +233,8 @@ double way_between(const Map& map, KeyframeId from, KeyframeId to) {
   return way_m;
 }
 
-/// Old keyframes that look like the newest one.
-std::vector<KeyframeId> alike(const Map& map, const LocalMap& local) {
+/// Old keyframes that look like the newest one, best first.
+std::vector<PlaceCandidate> alike(const Map& map, const LocalMap& local) {
   const KeyframeId newest = local.newest();
   std::vector<PlaceCandidate> ranking =
       map.places().query(*map.keyframe(newest).place, map.places().size());
@@ -248,15 +248,11 @@ std::vector<KeyframeId> alike(const Map& map, const LocalMap& local) {
     return candidate.keyframe > newest || candidate.score < kLeastAlike * as_before ||
            local.contains(candidate.keyframe);
   });
-  std::vector<KeyframeId> found;
-  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
-    found.push_back(candidate.keyframe);
-  }
-  return found;
+  return ranking;
 }
 
-/// Old keyframes whose depth the newest one should see, going by the way between.
-std::vector<KeyframeId> overlapping(const Map& map, const LocalMap& local) {
+/// Old keyframes whose depth the newest one should see, going by the way between, most first.
+std::vector<PlaceCandidate> overlapping(const Map& map, const LocalMap& local) {
   const Keyframe& newest = map.keyframe(local.newest());
   if (!newest.cloud) {
     return {};
@@ -268,11 +264,7 @@ std::vector<KeyframeId> overlapping(const Map& map, const LocalMap& local) {
       ranking.push_back({.keyframe = id, .score = overlap});
     }
   }
-  std::vector<KeyframeId> found;
-  for (const PlaceCandidate& candidate : peaks(ranking, kCandidates, kStretch)) {
-    found.push_back(candidate.keyframe);
-  }
-  return found;
+  return ranking;
 }
 
 /// What a loop says of where its new keyframe is.
@@ -320,20 +312,19 @@ std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeI
   }
   const LocalMap local{map, newest};
   auto problem = std::make_shared<LoopProblem>();
-  std::vector<KeyframeId> candidates = alike(map, local);
-  for (const KeyframeId id : overlapping(map, local)) {
-    if (std::ranges::find(candidates, id) == candidates.end()) {
-      candidates.push_back(id);
+  std::vector<LoopView>& candidates = problem->candidates;
+  for (const auto& ranking : {alike(map, local), overlapping(map, local)}) {
+    for (const auto& [id, score] : peaks(ranking, kCandidates, kStretch)) {
+      if (std::ranges::find(candidates, id, &LoopView::id) == candidates.end()) {
+        candidates.push_back(view_of(map, id, newest));
+      }
     }
-  }
-  for (const KeyframeId id : candidates) {
-    problem->candidates.push_back(view_of(map, id, newest));
   }
   problem->newest = view_of(map, newest, newest);
   problem->camera = camera_;
   problem->config = config_;
   problem->gicp = gicp_;
-  return problem->candidates.empty() ? nullptr : problem;
+  return candidates.empty() ? nullptr : problem;
 }
 
 std::vector<RelativeEdge> LoopCloser::consider(const Map& map, const LoopSolution& solution) {

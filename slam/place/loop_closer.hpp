@@ -17,8 +17,7 @@ namespace geoflow::slam {
 /// by P3P with RANSAC on the old view's depth, or else odometry does, which guides the search for
 /// more pairs; generalised ICP and the pairs refine it together; and the depth of each view has to
 /// lie on the other's surfaces, beyond doubt where not enough pairs agree, and no direction may be
-/// left open. Pure, deterministic,
-/// thread-safe.
+/// left open. Pure, deterministic, thread-safe.
 [[nodiscard]] LoopSolution verify_loops(const LoopProblem& problem);
 
 /// Decides which keyframes to compare, and which of the loops that were found to believe. A wrong

@@ -120,6 +120,48 @@ TEST(DualStreamFlow, LetsNoTwoTracksEndAtOnePlace) {
   }
 }
 
+TEST(DualStreamFlow, TakesTheWordOfWhatConfirmsATrack) {
+  // Every other seed is confirmed, 3 px from where flow found it: nothing that a check would pass.
+  const Views views{small_step};
+  const auto unconfirmed = views.tracked();
+  const auto confirm = [&](std::size_t i, const Vector2d& pixel) {
+    EXPECT_LT((pixel - views.truth[i]).norm(), 20) << i;
+    return i % 2 == 0 ? std::optional{Vector2d{pixel + Vector2d{0, 3}}} : std::nullopt;
+  };
+  FlowConfig flow;
+  flow.fundamental_threshold_px = 10;
+  const auto tracks = DualStreamFlow{flow, views.camera}.track(
+      views.pyramid(SE3{}), views.pyramid(views.T_odom_b), views.seeds, confirm);
+  std::size_t moved = 0;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i] && unconfirmed[i]) {
+      const Vector2d by = *tracks[i] - *unconfirmed[i];
+      EXPECT_NEAR(by.y(), i % 2 == 0 ? 3 : 0, 0.01) << i;
+      moved += i % 2 == 0 ? 1U : 0U;
+      kept += i % 2 == 0 ? 0U : 1U;
+    }
+  }
+  EXPECT_GT(moved, views.seeds.size() / 4);
+  EXPECT_GT(kept, views.seeds.size() / 4);
+}
+
+TEST(DualStreamFlow, TakesNoWiderWindowFromAPredictionThanThePyramidsHaveRoomFor) {
+  Views views{small_step};
+  for (std::size_t i = 0; i < views.seeds.size(); ++i) {
+    views.seeds[i].predicted = views.truth[i];
+  }
+  FlowConfig wide;
+  wide.prior_window_px = 2 * wide.window_px + 1;
+  FlowConfig same;
+  same.prior_window_px = same.window_px;
+  const auto track = [&](const FlowConfig& flow) {
+    return DualStreamFlow{flow, views.camera}.track(views.pyramid(SE3{}),
+                                                    views.pyramid(views.T_odom_b), views.seeds);
+  };
+  EXPECT_EQ(track(wide), track(same));
+}
+
 TEST(DualStreamFlow, OfNothingIsNothing) {
   const Views views{small_step};
   EXPECT_TRUE(DualStreamFlow({}, views.camera)
