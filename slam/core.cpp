@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
@@ -33,6 +32,7 @@
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/tracker.hpp"
+#include "optimisation/matrix6.hpp"
 #include "place/loop_closer.hpp"
 
 namespace geoflow::slam {
@@ -58,6 +58,7 @@ class Core::Impl {
         observer_{observer} {}
 
   PoseEstimate process(const SyncedPacket& packet) {
+    extend_map();
     const ImageShape& shape = packet.color.shape();
     if (shape.width != calibration_.camera.width || shape.height != calibration_.camera.height) {
       return predicted_only(packet);
@@ -72,7 +73,16 @@ class Core::Impl {
     return follow(packet, motion);
   }
 
+  void extend_map() {
+    if (const auto covariance = std::exchange(keyframe_due_, std::nullopt)) {
+      insert_keyframe(*covariance);
+      records_.back().reference = reference_;
+      records_.back().T_reference_cam = SE3{};
+    }
+  }
+
   std::optional<MappingTask> take_mapping_task() {
+    extend_map();
     if (std::exchange(loop_found_, false)) {
       return MappingTask{.problem = nullptr,
                          .graph = std::make_shared<const PoseGraphProblem>(pose_graph(map_))};
@@ -171,7 +181,7 @@ class Core::Impl {
     estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
     estimate.quality = quality(result);
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
-      insert_keyframe(covariance);
+      keyframe_due_ = covariance;
     }
     estimate.reset_counter = reset_counter_;
     records_.push_back(
@@ -274,7 +284,7 @@ class Core::Impl {
         map_.add_edge({.from = before,
                        .to = reference_,
                        .T_from_to = since_keyframe_->T_cam0_cam1,
-                       .information = since_keyframe_->covariance.inverse()});
+                       .information = inverse(since_keyframe_->covariance)});
       }
     }
     since_keyframe_.emplace();
@@ -291,6 +301,7 @@ class Core::Impl {
   MotionModel motion_;
   Map map_;
   KeyframeId reference_{};
+  std::optional<Matrix6d> keyframe_due_;  ///< covariance of the last frame, which is to become one
   std::optional<KeyframeId> pending_;
   std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
   bool loop_found_ = false;                       ///< the map is to be corrected
@@ -319,6 +330,9 @@ Result<std::unique_ptr<Core>> Core::create(const Calibration& calibration, const
 
 PoseEstimate Core::process(const SyncedPacket& packet) {
   return impl_->process(packet);
+}
+void Core::extend_map() {
+  impl_->extend_map();
 }
 std::optional<MappingTask> Core::take_mapping_task() {
   return impl_->take_mapping_task();

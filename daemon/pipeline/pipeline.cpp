@@ -11,6 +11,8 @@
 #include <utility>
 
 #include <pthread.h>
+#include <sys/resource.h>
+#include <tbb/task_arena.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
@@ -54,6 +56,13 @@ struct Bells {
     return Bells{.sync = std::move(*sync), .slam = std::move(*slam), .map = std::move(*map)};
   }
 };
+
+/// Lets all other threads go before the calling one, here and in other processes. To give way needs
+/// no privilege.
+void give_way() {
+  constexpr int kNice = 10;
+  ::setpriority(PRIO_PROCESS, 0, kNice);  // to Linux, 0 is this thread
+}
 
 }  // namespace
 
@@ -182,6 +191,7 @@ class Pipeline::Implementation {
     const PoseEstimate estimate = process_packet(run_, packet);
     on_estimate_(packet, estimate);
     run_.statistics->delivery.add(HostClock::now() - packet.t_arrival);
+    run_.core->extend_map();
     if (!mapping_) {
       if (auto task = run_.core->take_mapping_task()) {
         mapping_ = tasks_.try_push(std::move(*task));
@@ -206,12 +216,17 @@ class Pipeline::Implementation {
     }
   }
 
+  /// A frame must not wait for the map: on this thread, at low priority, and without TBB's threads,
+  /// which would not have it.
   void map(const std::stop_token& stop) {
+    give_way();
+    tbb::task_arena alone{1};
     bool stopped = false;
     while (!stopped) {
       if (const auto task = tasks_.try_pop()) {
         // One task is out at a time, so there is room for its result.
-        (void)results_.try_push(slam::optimise(*task, &run_.statistics->mapping));
+        (void)results_.try_push(
+            alone.execute([&] { return slam::optimise(*task, &run_.statistics->mapping); }));
         bells_.slam.ring();
         stopped = stop.stop_requested();
       } else {

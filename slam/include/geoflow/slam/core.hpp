@@ -48,6 +48,11 @@ class Core {
   /// alone, with status kDegraded.
   [[nodiscard]] PoseEstimate process(const SyncedPacket& packet);
 
+  /// Makes the last frame a keyframe if it is to be one: apart from process(), so that its pose
+  /// need not wait for what later frames gain by that. The next call of process() or
+  /// take_mapping_task() does it otherwise.
+  void extend_map();
+
   /// A snapshot for one local bundle adjustment, once after each keyframe; nothing otherwise.
   [[nodiscard]] std::optional<MappingTask> take_mapping_task();
 

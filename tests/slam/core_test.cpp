@@ -1,0 +1,74 @@
+#include "geoflow/slam/core.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/core/mat.hpp>
+
+#include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/image.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
+
+#include "vision/textured_wall.hpp"
+
+namespace geoflow::slam {
+namespace {
+
+constexpr double kDistanceM = 1.5;
+constexpr double kStepM = 0.02;
+constexpr int kFrames = 12;
+
+/// Twelve frames of a wall, 20 ms and 2 cm sideways apart.
+std::vector<SyncedPacket> walk_along_a_wall() {
+  const TexturedWall wall{kDistanceM, 3};
+  const CameraIntrinsics camera = wall_camera();
+  std::vector<SyncedPacket> packets;
+  for (int i = 0; i < kFrames; ++i) {
+    SyncedPacket packet;
+    packet.t = HostTime{std::chrono::milliseconds{1000 + 20 * i}};
+    packet.sequence = static_cast<std::uint64_t>(i);
+    packet.color = FramePool{1}.acquire({camera.width, camera.height, PixelFormat::kGray8});
+    const cv::Mat1b seen = wall.seen_from({Eigen::Quaterniond::Identity(), {kStepM * i, 0, 0}});
+    std::ranges::copy(std::as_bytes(std::span{seen.data, seen.total()}),
+                      packet.color.writable_bytes().begin());
+    packet.depth = FramePool{1}.acquire({camera.width, camera.height, PixelFormat::kDepth16});
+    const std::vector<std::uint16_t> millimetres(
+        seen.total(), static_cast<std::uint16_t>(std::lround(1e3 * kDistanceM)));
+    std::ranges::copy(std::as_bytes(std::span{millimetres}), packet.depth.writable_bytes().begin());
+    packets.push_back(packet);
+  }
+  return packets;
+}
+
+TEST(Core, ThePoseDoesNotWaitForItsKeyframeNorDependOnWhenThatIsMade) {
+  Calibration calibration;
+  calibration.camera = wall_camera();
+  const auto at_once = Core::create(calibration, {}).value();
+  const auto late = Core::create(calibration, {}).value();
+  for (const SyncedPacket& packet : walk_along_a_wall()) {
+    const SE3 T_at_once = at_once->process(packet).T_odom_base;
+    at_once->extend_map();
+    const PoseEstimate estimate = late->process(packet);
+    EXPECT_EQ(estimate.status, TrackingStatus::kTracking);
+    EXPECT_EQ(estimate.T_odom_base.translation(), T_at_once.translation());
+    EXPECT_EQ(estimate.T_odom_base.rotation().coeffs(), T_at_once.rotation().coeffs());
+  }
+  const double way = kStepM * (kFrames - 1);
+  const SE3 T_odom_last = late->final_trajectory().back().pose;
+  EXPECT_NEAR(T_odom_last.translation().norm(), way, 0.05 * way);
+  // Within 22 cm there is more than the first keyframe.
+  EXPECT_TRUE(at_once->take_mapping_task().has_value());
+  EXPECT_TRUE(late->take_mapping_task().has_value());
+}
+
+}  // namespace
+}  // namespace geoflow::slam
