@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
 
 /// What a cell's neighbours say of it: DepthCloud's noise and normals.
@@ -71,6 +72,22 @@ float median(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Visits the cells of the grid that are so many rows or columns away from one, row by row.
+template <typename Visit>
+void for_each_in_ring(const CellGrid& grid, std::uint32_t cell, int ring, const Visit& visit) {
+  const int columns = grid.columns();
+  const int column = static_cast<int>(cell) % columns;
+  const int row = static_cast<int>(cell) / columns;
+  for (int r = std::max(row - ring, 0); r <= std::min(row + ring, grid.rows() - 1); ++r) {
+    const int step = std::abs(r - row) == ring ? 1 : 2 * ring;
+    for (int c = column - ring; c <= column + ring; c += step) {
+      if (c >= 0 && c < columns) {
+        visit(r * columns + c);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -164,9 +181,6 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   const Eigen::Vector2f ray0 = rays_[cell].head<2>();
   Eigen::Vector2f slope = centre.normal.head<2>() / centre.normal.dot(centre.point);
   const auto enough = static_cast<float>(config_.normal_sigma_rad * config_.normal_sigma_rad);
-  const int columns = grid_->columns();
-  const int column = static_cast<int>(cell) % columns;
-  const int row = static_cast<int>(cell) / columns;
   PlaneFit plane;
   const auto add_if_it_continues = [&](int index) {
     const Eigen::Vector3f& other = rays_[static_cast<std::size_t>(index)];
@@ -178,14 +192,7 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   };
   add_if_it_continues(static_cast<int>(cell));
   for (int ring = 1; ring <= kRings && best.w() > enough; ++ring) {
-    for (int r = std::max(row - ring, 0); r <= std::min(row + ring, grid_->rows() - 1); ++r) {
-      const int step = std::abs(r - row) == ring ? 1 : 2 * ring;
-      for (int c = column - ring; c <= column + ring; c += step) {
-        if (c >= 0 && c < columns) {
-          add_if_it_continues(r * columns + c);
-        }
-      }
-    }
+    for_each_in_ring(*grid_, cell, ring, add_if_it_continues);
     PlaneFit fitted = plane;
     if (!fitted.solve() ||
         fitted.squares > kMisfit * (fitted.count - kParameters) * sigma_ * sigma_) {

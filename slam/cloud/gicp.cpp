@@ -6,12 +6,13 @@
 #include <cstdint>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp_internal.hpp"
+#include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -47,9 +48,9 @@ Spectrum analyse(const NormalEquations& system, const GicpConfig& config, double
   const Vector6d units = spectrum.units();
   const Matrix6d H = units.asDiagonal() * (system.H - system.H_noise) * units.asDiagonal();
   const Matrix6d noise = units.asDiagonal() * system.H_noise * units.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver{0.5 * (H + H.transpose())};
-  spectrum.eigenvalues = solver.eigenvalues();
-  spectrum.directions = solver.eigenvectors();
+  const SymmetricEigen eigen = symmetric_eigen(0.5 * (H + H.transpose()));
+  spectrum.eigenvalues = eigen.eigenvalues;
+  spectrum.directions = eigen.directions;
   for (int i = 0; i < 6; ++i) {
     const Vector6d direction = spectrum.directions.col(i);
     const double feigned = direction.dot(noise * direction);
@@ -165,13 +166,13 @@ std::vector<SurfelSample> select(const DepthCloud& cloud, std::size_t count) {
   }
   constexpr double kRegularisation = 1e-9;
   H.diagonal() += Vector6d::Constant(kRegularisation * H.trace());
-  const Matrix6d inverse = H.inverse();
+  const Matrix6d H_inverse = inverse(H);
   const double even = 6.0 / static_cast<double>(cloud.size());  // leverages sum to 6
   std::vector<double> importance;
   double total = 0;
   for (const std::uint32_t cell : cloud.valid()) {
     const Vector6d row = jacobian(cell);
-    importance.push_back(0.5 * (row.dot(inverse * row) + even));
+    importance.push_back(0.5 * (row.dot(H_inverse * row) + even));
     total += importance.back();
   }
   const double spacing = total / static_cast<double>(count);

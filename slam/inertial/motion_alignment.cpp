@@ -18,6 +18,7 @@
 #include "inertial/initialiser.hpp"
 #include "inertial/nav_state.hpp"
 #include "inertial/preintegration.hpp"
+#include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -35,8 +36,8 @@ constexpr double kMostChiSquare = 3.0;
 using MotionMatrix = Eigen::Matrix<double, kMotionSize, kMotionSize>;
 using MotionVector = Eigen::Matrix<double, kMotionSize, 1>;
 
-double worst_sigma(const Eigen::MatrixXd& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{covariance, Eigen::EigenvaluesOnly};
+double worst_sigma(const Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen{covariance, Eigen::EigenvaluesOnly};
   return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
 }
 
@@ -72,7 +73,10 @@ class Alignment {
     const Eigen::Index newest_at = bias_at_ - kMotionSize;
     MotionFix fix;
     fix.gravity_odom = gravity_odom_;
-    fix.gravity_sigma_rad = worst_sigma(covariance.bottomRightCorner<kGravitySize, kGravitySize>());
+    Matrix3d gravity = Matrix3d::Zero();
+    gravity.topLeftCorner<kGravitySize, kGravitySize>() =
+        covariance.bottomRightCorner<kGravitySize, kGravitySize>();
+    fix.gravity_sigma_rad = worst_sigma(gravity);
     fix.states = states_;
     // The newest pose's unknowns and the biases stand side by side, in a state's order.
     fix.covariance = covariance.block<kStateSize, kStateSize>(newest_at, newest_at);
@@ -129,7 +133,7 @@ class Alignment {
     for (std::size_t i = 0; i < between_.size(); ++i) {
       add_motion(i);
     }
-    const BiasMatrix information = prior_.covariance.inverse();
+    const BiasMatrix information = inverse(prior_.covariance);
     const Vector6d error = states_.front().bias.vector() - prior_.bias.vector();
     H_.block<kBiasSize, kBiasSize>(bias_at_, bias_at_) += information;
     b_.segment<kBiasSize>(bias_at_) += information * error;

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/LU>
-
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -29,7 +28,7 @@ constexpr double kShortest = 1e-3;  // [s]
 }  // namespace
 
 bool is_blind(const PosePrior& prior) {
-  const Vector6d variance = prior.information.inverse().diagonal();
+  const Vector6d variance = inverse(prior.information).diagonal();
   return variance.head<3>().maxCoeff() > kBlindRad * kBlindRad ||
          variance.tail<3>().maxCoeff() > kBlindM * kBlindM;
 }

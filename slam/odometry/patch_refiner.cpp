@@ -38,7 +38,7 @@ std::optional<PatchWarp> PatchRefiner::warp(const Keyframe& reference, const Vec
   }
   const SE3 T_reference_cam = T_odom_reference.inverse() * T_odom_cam;
   const Vector3d normal = surfel->normal.cast<double>();
-  const Vector3d origin = T_reference_cam.translation();
+  const Vector3d& origin = T_reference_cam.translation();
   const double distance = normal.dot(surfel->point.cast<double>() - origin);
   const auto seen_at = [&](const Vector2d& pixel) -> std::optional<Vector2d> {
     const Vector3d ray =

@@ -12,6 +12,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/gicp.hpp"
+#include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -42,7 +43,7 @@ struct PoseOptimiser::System {
 std::vector<VisualMatch> PoseOptimiser::expected(const PoseProblem& problem) const {
   constexpr double kChi2Of2At999Permille = 13.8;
   const SE3 T_cam_odom = problem.prior.T_odom_cam.inverse();
-  const Matrix6d P = problem.prior.information.inverse();
+  const Matrix6d P = inverse(problem.prior.information);
   std::vector<VisualMatch> found;
   for (const VisualMatch& match : problem.matches) {
     const Vector3d p_cam = T_cam_odom * match.p_odom;

@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
-
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
@@ -30,6 +28,7 @@
 #include "odometry/frame.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "optimisation/matrix6.hpp"
 #include "place/relocaliser.hpp"
 #include "vision/dual_stream_flow.hpp"
 #include "vision/image_pyramid.hpp"
@@ -341,8 +340,7 @@ TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predi
                                       .gate_by_prior = initial.source == PoseSource::kLegs},
                                      initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
-  result.covariance =
-      initial.sure ? result.solution.covariance : Matrix6d{prior.information.inverse()};
+  result.covariance = initial.sure ? result.solution.covariance : inverse(prior.information);
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);
   result.visual_fix = result.solution.visual_inliers >= enough;

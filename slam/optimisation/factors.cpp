@@ -4,9 +4,10 @@
 #include <cmath>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include "geoflow/hal/geometry.hpp"
+
+#include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -104,9 +105,9 @@ RelativePoseFactor::RelativePoseFactor(const SE3& T_a_b, const Matrix6d& informa
     : T_b_a_{T_a_b.inverse()} {
   // A symmetric root stays real and finite where a direction is open (eigenvalue zero, or a
   // rounding below it).
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen{information};
-  W_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
-       eigen.eigenvectors().transpose();
+  const SymmetricEigen eigen = symmetric_eigen(information);
+  W_ = eigen.directions * eigen.eigenvalues.cwiseMax(0).cwiseSqrt().asDiagonal() *
+       eigen.directions.transpose();
 }
 
 bool RelativePoseFactor::Evaluate(const double* const* parameters, double* residuals,

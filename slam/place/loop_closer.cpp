@@ -8,11 +8,8 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <utility>
 #include <vector>
-
-#include <Eigen/LU>
 
 #include "geoflow/hal/geometry.hpp"
 
@@ -22,6 +19,7 @@
 #include "map/map.hpp"
 #include "map/overlap.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "optimisation/matrix6.hpp"
 #include "place/loop_problem.hpp"
 #include "place/place_index.hpp"
 #include "vision/camera_model.hpp"
@@ -123,7 +121,7 @@ class Verifier {
         .edge = {.from = old.id,
                  .to = problem_.newest.id,
                  .T_from_to = T_old_new1,
-                 .information = (solution.covariance + of_two_views()).inverse()},
+                 .information = inverse(solution.covariance + of_two_views())},
         .certain = depth && solution.visual_inliers >= kInliersBeyondDoubt &&
                    agrees(old, T_old_new1, kSeenBeyondDoubt, kAgreeingBeyondDoubt)};
   }

@@ -62,14 +62,14 @@ std::optional<WidePatch> warped(const ImagePyramid& reference, const PatchWarp& 
     }
   }
   using WideRow = Eigen::Array<float, kWide, 1>;
-  const Eigen::Matrix3f Hf = H.cast<float>();
+  const Eigen::Matrix3f H_pixel = H.cast<float>();
   const WideRow offsets = WideRow::LinSpaced(-kRim, kRim);
   WidePatch patch;
   for (int row = 0; row < kWide; ++row) {
-    const Eigen::Vector3f left = Hf.rightCols<2>() * Eigen::Vector2f{offsets[row], 1};
-    const WideRow inverse = (left.z() + Hf(2, 0) * offsets).inverse();
-    const WideRow x = (left.x() + Hf(0, 0) * offsets) * inverse;
-    const WideRow y = (left.y() + Hf(1, 0) * offsets) * inverse;
+    const Eigen::Vector3f left = H_pixel.rightCols<2>() * Eigen::Vector2f{offsets[row], 1};
+    const WideRow inverse = (left.z() + H_pixel(2, 0) * offsets).inverse();
+    const WideRow x = (left.x() + H_pixel(0, 0) * offsets) * inverse;
+    const WideRow y = (left.y() + H_pixel(1, 0) * offsets) * inverse;
     for (int column = 0; column < kWide; ++column) {
       patch(column, row) = bilinear(image, x[column], y[column]);
     }
