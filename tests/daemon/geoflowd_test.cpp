@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -192,7 +193,7 @@ TEST_F(GeoflowdTest, TheVerbsReplayPoseRecordAndInfoWorkTogether) {
       run_process({GEOFLOW_PROGRAM, "pose", "--socket", pose_.string(), "--once"}, log("nobody"))
           .code,
       4);
-  Process process{daemon({"--loop"}), log("daemon")};
+  const Process process{daemon({"--loop"}), log("daemon")};
   connect_when_up();
   const auto pose = run_process(
       {GEOFLOW_PROGRAM, "pose", "--socket", pose_.string(), "--once", "--json"}, log("pose"));

@@ -16,10 +16,10 @@
 #include "geoflow/daemon/lock_step_runner.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
-#include "geoflow/hal/time.hpp"
 #include "tests/support/data.hpp"
 
 #include "synthetic_recording.hpp"

@@ -10,11 +10,20 @@
 #include <variant>
 #include <vector>
 
+#include <sys/stat.h>
+#include <sys/types.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/pose_client.hpp"
+#include "geoflow/daemon/records.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
 #include "tests/support/data.hpp"
 
+#include "server/event_loop.hpp"
+#include "server/listening_socket.hpp"
 #include "server_fixture.hpp"
 
 namespace geoflow::daemon {
@@ -103,6 +112,7 @@ TEST_F(ServerTest, GarbageIsRefusedWithAReason) {
 
 TEST_F(ServerTest, TooManyClientsAreRefusedAndThoseThereAreServed) {
   std::vector<PoseClient> inside;
+  inside.reserve(static_cast<std::size_t>(config_.clients));
   for (int i = 0; i < config_.clients; ++i) {
     inside.push_back(connect());
   }
@@ -122,7 +132,7 @@ TEST_F(ServerTest, TooManyClientsAreRefusedAndThoseThereAreServed) {
 TEST_F(ServerTest, AFloodingClientIsCutOffAndOthersAreServed) {
   PoseClient good = connect();
   const UniqueFd flood = raw_socket(config_.pose, SOCK_SEQPACKET);
-  geoflow_hello hello{};
+  const geoflow_hello hello{};
   const auto bytes = encode_record(GEOFLOW_HELLO, 0, 0, hello);
   ssize_t sent = 1;
   for (int i = 0; i < 100000 && sent > 0; ++i) {
@@ -174,7 +184,7 @@ TEST_F(ServerTest, ASecondDaemonIsRefusedWithThePid) {
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
   EXPECT_THAT(second.error().message, HasSubstr(std::to_string(::getpid())));
-  PoseClient client = connect();  // the first one is unharmed
+  const PoseClient client = connect();  // the first one is unharmed
 }
 
 TEST(ListeningSocketTest, AStaleSocketIsReplacedAndAnythingElseIsNot) {
@@ -182,6 +192,7 @@ TEST(ListeningSocketTest, AStaleSocketIsReplacedAndAnythingElseIsNot) {
   const auto path = directory.path() / "pose.sock";
   {
     const UniqueFd stale{::socket(AF_UNIX, SOCK_SEQPACKET, 0)};
+    ASSERT_TRUE(stale);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(&address.sun_path[0], path.c_str(), sizeof address.sun_path - 1);

@@ -22,7 +22,7 @@ namespace geoflow::tests {
 namespace {
 
 std::string read_text(const std::filesystem::path& path) {
-  std::ifstream file{path};
+  const std::ifstream file{path};
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
@@ -39,6 +39,7 @@ Process::Process(const std::vector<std::string>& arguments, const std::filesyste
     : log_{log} {
   std::vector<std::string> copies = arguments;
   std::vector<char*> argv;
+  argv.reserve(copies.size());
   for (std::string& argument : copies) {
     argv.push_back(argument.data());
   }

@@ -1,6 +1,5 @@
 #include "geoflow/daemon/records.hpp"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,6 @@
 #include "synthetic_recording.hpp"
 
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>

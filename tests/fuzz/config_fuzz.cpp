@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   std::string again;
   for (const auto& [key, value] : list_keys(*config)) {
-    again += key + " = " + value + "\n";
+    again.append(key).append(" = ").append(value).append("\n");
   }
   if (!parse_config(again, "again")) {
     std::abort();

@@ -1,5 +1,6 @@
 #include "geoflow/hal/toml_text.hpp"
 
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -14,7 +15,11 @@ namespace {
 using testing::StartsWith;
 
 TEST(TomlText, LetsPassWhatIsWellFormed) {
-  for (const std::string_view text : {
+  // In two: the escape would take the a for its own.
+  constexpr std::string_view kByteOrderMarkAndMore =
+      "\xEF\xBB\xBF"
+      "a = 1\n";
+  for (const std::string_view text : std::initializer_list<std::string_view>{
            "",
            "a = 1\n",
            "[a]\nb = 2.5e-3 # x\n",
@@ -23,8 +28,7 @@ TEST(TomlText, LetsPassWhatIsWellFormed) {
            "path = \"/home/Jos\xC3\xA9/[ x\"\n",
            "path = 'C:\\[='\n",
            "# \xC3\xA9 [=\na = 1\n",
-           "\xEF\xBB\xBF"
-           "a = 1\n",
+           kByteOrderMarkAndMore,
            "a = \"\"\"\nx [= \xC3\xA9 \"quoted\" \\\"\"\"\n\"\"\"\n",
            "a = \"\\\"[=\"\n",
            "a = \"\"\n[b]\n",

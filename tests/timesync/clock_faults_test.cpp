@@ -52,9 +52,11 @@ class Stream {
   }
 
   /// Feeds [begin_s, end_s) at the stream's rate; the worst error and whether every bound held.
-  Judged feed_all(
-      double begin_s, double end_s,
-      const std::function<double(double)>& extra_ns = [](double) { return 0.0; }) {
+  Judged feed_all(double begin_s, double end_s) {
+    return feed_all(begin_s, end_s, [](double) { return 0.0; });
+  }
+  /// With a delay of extra_ns(t_s) more.
+  Judged feed_all(double begin_s, double end_s, const std::function<double(double)>& extra_ns) {
     Judged worst;
     const auto samples = static_cast<int>(std::lround((end_s - begin_s) * kRateHz));
     for (int i = 0; i < samples; ++i) {

@@ -7,6 +7,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "map/ids.hpp"
 #include "map/map.hpp"
 #include "place/place_index.hpp"
 #include "vision/orb_features.hpp"
@@ -53,7 +54,7 @@ void place_index_query(benchmark::State& state) {
     index.add(KeyframeId{i}, views.next());
   }
   const PlaceView view = views.next();
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     benchmark::DoNotOptimize(index.query(view, 10));
   }
   state.counters["MB"] = static_cast<double>(index.memory_bytes()) / 1e6;
@@ -64,7 +65,7 @@ void place_index_add(benchmark::State& state) {
   const PlaceView view = views.next();
   PlaceIndex index;
   std::uint32_t id = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     index.add(KeyframeId{id++}, view);
     if (id % 1000 == 0) {
       state.PauseTiming();

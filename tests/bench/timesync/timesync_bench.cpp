@@ -28,7 +28,7 @@ constexpr std::int64_t kFramePeriodNs = 33'333'333;
 void spsc_ring_push_pop(benchmark::State& state) {
   SpscRing<std::uint64_t> ring{kRingCapacity};
   std::uint64_t value = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     benchmark::DoNotOptimize(ring.try_push(value++));
     benchmark::DoNotOptimize(ring.try_pop());
   }
@@ -39,7 +39,7 @@ BENCHMARK(spsc_ring_push_pop);
 /// Throughput from one thread to another.
 void spsc_ring_two_threads(benchmark::State& state) {
   SpscRing<std::uint64_t> ring{kRingCapacity};
-  std::jthread consumer{[&ring](const std::stop_token& stop) {
+  const std::jthread consumer{[&ring](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       if (!ring.try_pop()) {
         std::this_thread::yield();
@@ -47,7 +47,7 @@ void spsc_ring_two_threads(benchmark::State& state) {
     }
   }};
   std::uint64_t value = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     while (!ring.try_push(value)) {
       std::this_thread::yield();
     }
@@ -60,7 +60,7 @@ BENCHMARK(spsc_ring_two_threads)->UseRealTime();
 void drop_oldest_ring_full(benchmark::State& state) {
   DropOldestRing<std::uint64_t> ring{4};
   std::uint64_t value = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     ring.push(value++);
   }
   state.SetItemsProcessed(state.iterations());
@@ -70,7 +70,7 @@ BENCHMARK(drop_oldest_ring_full);
 void latest_store_load(benchmark::State& state) {
   Latest<std::uint64_t> latest;
   std::uint64_t value = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     latest.store(value++);
     benchmark::DoNotOptimize(latest.load());
   }
@@ -89,7 +89,7 @@ void clock_model_add(benchmark::State& state) {
   ClockModel<ImuClock> model{{.domain = StampDomain::kDevice}};
   std::int64_t t_ns = 0;
   std::size_t i = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     t_ns += kImuPeriodNs;
     const std::int64_t arrival_ns = t_ns + delays_ns[i++ % kDelays];
     benchmark::DoNotOptimize(
@@ -108,7 +108,7 @@ void synchroniser_packet(benchmark::State& state) {
   std::int64_t t_ns = 0;
   std::int64_t next_frame_ns = 0;
   std::int64_t packets = 0;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     next_frame_ns += kFramePeriodNs;
     for (; t_ns < next_frame_ns + kImuPeriodNs; t_ns += kImuPeriodNs) {
       const Duration t{t_ns};

@@ -25,7 +25,7 @@ void render(benchmark::State& state, const char* name) {
   const SE3 T_base_cam = go2_T_base_cam();
   const auto pose = [&](double t_s) { return walk.body().at(t_s).T_world_base * T_base_cam; };
   std::uint64_t frame = kFirstFrame;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     benchmark::DoNotOptimize(camera->render(static_cast<double>(frame) / kRate_hz, frame, pose));
     ++frame;
   }

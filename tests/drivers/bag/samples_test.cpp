@@ -20,6 +20,7 @@
 
 #include "replay/bag/transforms.hpp"
 #include "replay/cdr/messages.hpp"
+#include "replay/reader.hpp"
 
 namespace geoflow::drivers {
 namespace {

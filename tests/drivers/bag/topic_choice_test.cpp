@@ -10,6 +10,7 @@
 
 #include "geoflow/drivers/recording.hpp"
 
+#include "replay/bag/bag.hpp"
 #include "replay/cdr/messages.hpp"
 
 namespace geoflow::drivers {

@@ -1,9 +1,9 @@
 #include "replay/cdr/codec.hpp"
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <tuple>
@@ -13,7 +13,6 @@
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 #include <rapidcheck/gtest.h>
 
 #include "geoflow/hal/result.hpp"

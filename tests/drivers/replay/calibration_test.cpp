@@ -3,12 +3,10 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
-#include <numbers>
+#include <iterator>
 #include <random>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +19,6 @@
 
 #include "replay/calibration/find.hpp"
 #include "replay/calibration/kalibr.hpp"
-#include "replay/calibration/yaml.hpp"
 #include "replay/fixtures.hpp"
 
 namespace geoflow::drivers {

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstddef>
-#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

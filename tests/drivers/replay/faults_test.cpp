@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
@@ -45,7 +46,7 @@ class ScriptedReader final : public RecordingReader {
  public:
   ScriptedReader() {
     info_.start = at_ms(kStart_ms);
-    info_.end = at_ms(kStart_ms + kSamples * kPeriod_ms);
+    info_.end = at_ms(kStart_ms + std::int64_t{kSamples} * kPeriod_ms);
   }
   [[nodiscard]] const RecordingInfo& info() const override { return info_; }
   [[nodiscard]] Result<std::optional<Event>> next() override {
@@ -61,7 +62,7 @@ class ScriptedReader final : public RecordingReader {
  private:
   static Event make(StreamId stream, int round) {
     const auto since_epoch =
-        milliseconds{kStart_ms + round * kPeriod_ms + static_cast<int>(stream)};
+        milliseconds{kStart_ms + std::int64_t{round} * kPeriod_ms + static_cast<int>(stream)};
     const HostTime arrival{since_epoch};
     switch (stream) {
       case StreamId::kColor:

@@ -1,8 +1,6 @@
 #include <algorithm>
-#include <cstdint>
 #include <filesystem>
 #include <string>
-#include <utility>
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -11,10 +9,12 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/time.hpp"
 #include "tests/support/data.hpp"
 
 #include "replay/fixtures.hpp"
 #include "replay/openloris/calibration.hpp"
+#include "replay/reader.hpp"
 
 namespace geoflow::drivers {
 namespace {

@@ -167,7 +167,7 @@ TEST_F(RecordedStreamsTest, AStopInterruptsTheWait) {
   ASSERT_TRUE(streams_->camera().start(recorder_));
   std::stop_source stop;
   const HostTime begin = HostClock::now();
-  std::jthread stopper{[&] {
+  const std::jthread stopper{[&] {
     std::this_thread::sleep_for(milliseconds{50});
     stop.request_stop();
   }};

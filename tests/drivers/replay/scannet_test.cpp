@@ -6,12 +6,10 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/core/mat.hpp>
@@ -28,7 +26,6 @@
 #include "tests/support/data.hpp"
 
 #include "replay/fixtures.hpp"
-#include "replay/scannet/format.hpp"
 #include "replay/scannet/geometry.hpp"
 
 namespace geoflow::drivers {
@@ -110,9 +107,9 @@ struct Scan {
                  cv::Mat{kColorHeight, kColorWidth, CV_8UC3, cv::Scalar(10 + i, 100, 200)}, color);
     const std::vector<std::uint16_t> depth(std::size_t{kDepthWidth} * kDepthHeight,
                                            static_cast<std::uint16_t>(1500 + i));
-    std::vector<Bytef> packed(compressBound(depth.size() * 2));
-    uLongf length = packed.size();
-    EXPECT_EQ(compress(packed.data(), &length, reinterpret_cast<const Bytef*>(depth.data()),
+    std::vector<unsigned char> packed(compressBound(depth.size() * 2));
+    unsigned long length = packed.size();
+    EXPECT_EQ(compress(packed.data(), &length, reinterpret_cast<const unsigned char*>(depth.data()),
                        depth.size() * 2),
               Z_OK);
     std::string bytes;
@@ -269,13 +266,16 @@ TEST(ScanNetGeometry, RegistersATiltedPlane) {
   const SE3 T_color_depth{so3::exp({0, 0.01, 0.005}), {0.03, -0.002, 0.004}};
   const Vector3d n_depth = Vector3d{0.3, -0.2, -1}.normalized();
   const double offset_m = -2.0;  // n . p = offset
-  const auto ray = [](const CameraIntrinsics& camera, double u, double v) {
+  const auto ray = [](const CameraIntrinsics& camera, int pixel) {
+    const int u = pixel % 160;
+    const int v = pixel / 160;
     return Vector3d{(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1};
   };
   std::vector<std::uint16_t> depth;
+  depth.reserve(std::size_t{160} * 120);
   for (int i = 0; i < 160 * 120; ++i) {
     depth.push_back(static_cast<std::uint16_t>(
-        std::lround(1e3 * offset_m / n_depth.dot(ray(depth_camera, i % 160, i / 160)))));
+        std::lround(1e3 * offset_m / n_depth.dot(ray(depth_camera, i)))));
   }
   const auto moved = scannet::register_depth(depth, depth_camera, color_camera, T_color_depth, 1e3);
   const Vector3d n_color = T_color_depth.rotation() * n_depth;
@@ -284,8 +284,7 @@ TEST(ScanNetGeometry, RegistersATiltedPlane) {
   double worst_mm = 0;
   for (int i = 0; i < 160 * 120; ++i) {
     const std::uint16_t value = moved[static_cast<std::size_t>(i)];
-    const double expected_mm =
-        1e3 * offset_color_m / n_color.dot(ray(color_camera, i % 160, i / 160));
+    const double expected_mm = 1e3 * offset_color_m / n_color.dot(ray(color_camera, i));
     if (value != 0) {
       ++seen;
       worst_mm = std::max(worst_mm, std::abs(value - expected_mm));
@@ -299,7 +298,7 @@ TEST(ScanNetGeometry, RegistersATiltedPlane) {
 TEST(ScanNetGeometry, TheNearerSurfaceHidesTheOther) {
   const CameraIntrinsics camera{
       .width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 31.5, .cy = 23.5};
-  std::vector<std::uint16_t> depth(64 * 48, 3000);
+  std::vector<std::uint16_t> depth(std::size_t{64} * 48, 3000);
   for (std::size_t i = 0; i < depth.size(); ++i) {
     if (i % 64 < 32) {
       depth[i] = 1000;
@@ -310,7 +309,8 @@ TEST(ScanNetGeometry, TheNearerSurfaceHidesTheOther) {
                                              SE3{Eigen::Quaterniond::Identity(), {0.1, 0, 0}}, 1e3);
   for (int x = 0; x < 64; ++x) {
     const std::uint16_t expected = x < 6 ? 0 : x < 38 ? 1000 : 3000;
-    EXPECT_EQ(moved[20 * 64 + static_cast<std::size_t>(x)], expected) << "column " << x;
+    EXPECT_EQ(moved[std::size_t{20} * 64 + static_cast<std::size_t>(x)], expected)
+        << "column " << x;
   }
 }
 
@@ -328,7 +328,7 @@ TEST(ScanNetGeometry, ResamplingKeepsAGradientInPlace) {
   ASSERT_EQ(resampled.size(), 64U * 48U * 3U);
   for (int y = 2; y < 46; ++y) {
     for (int x = 2; x < 62; ++x) {
-      const std::byte* pixel = resampled.data() + (y * 64 + x) * 3;
+      const std::byte* pixel = resampled.data() + std::ptrdiff_t{3} * (y * 64 + x);
       const double u = (x - target.cx) / target.fx * source.fx + source.cx;
       const double v = (y - target.cy) / target.fy * source.fy + source.cy;
       EXPECT_NEAR(std::to_integer<int>(pixel[0]), u, 0.51);

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -105,10 +107,8 @@ TEST(DepthCloud, StatedVarianceIsThatOfTheNoiseWhetherItsPixelsErrAloneOrTogethe
 /// What librealsense's align makes of a depth camera's image on a colour camera at the same place:
 /// each pixel has the nearest of the depth pixels whose outline touches it.
 FrameRef aligned(const FrameRef& depth, const CameraIntrinsics& from, const CameraIntrinsics& to) {
-  FrameRef image = FramePool{1}.acquire({to.width, to.height, PixelFormat::kDepth16});
-  const auto bytes = image.writable_bytes();
-  auto* const pixels = static_cast<std::uint16_t*>(static_cast<void*>(bytes.data()));
-  std::fill_n(pixels, to.width * to.height, std::uint16_t{0});
+  const auto width = static_cast<std::size_t>(to.width);
+  std::vector<std::uint16_t> pixels(width * static_cast<std::size_t>(to.height));
   const auto along = [](double x, double f, double c, double f_to, double c_to) {
     return static_cast<int>(std::floor((x - c) / f * f_to + c_to + 0.5));
   };
@@ -121,13 +121,24 @@ FrameRef aligned(const FrameRef& depth, const CameraIntrinsics& from, const Came
       const int bottom = std::min(to.height - 1, along(v + 0.5, from.fy, from.cy, to.fy, to.cy));
       for (int y = top; y <= bottom; ++y) {
         for (int x = left; x <= right; ++x) {
-          std::uint16_t& pixel = pixels[y * to.width + x];
+          std::uint16_t& pixel =
+              pixels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
           pixel = pixel == 0 ? z : std::min(pixel, z);
         }
       }
     }
   }
+  FrameRef image = FramePool{1}.acquire({to.width, to.height, PixelFormat::kDepth16});
+  std::ranges::copy(std::as_bytes(std::span{pixels}), image.writable_bytes().begin());
   return image;
+}
+
+/// The pixel at an offset from the corner of a cell of 8 x 8.
+Vector2d pixel_of(const DepthCloud& cloud, std::uint32_t cell, const Vector2d& offset) {
+  const auto columns = static_cast<std::uint32_t>(cloud.grid().columns());
+  const std::uint32_t column = cell % columns;
+  const std::uint32_t row = cell / columns;
+  return 8.0 * Vector2d{column, row} + offset;
 }
 
 /// Mean distance [m] of a corridor's surfels towards the camera from the planes they lie on.
@@ -173,9 +184,7 @@ TEST(PixelDepth, IsThatOfTheSurfaceAndNoneOnItsEdge) {
   double squares = 0;
   double count = 0;
   for (const std::uint32_t cell : cloud.valid()) {
-    const auto columns = static_cast<std::uint32_t>(cloud.grid().columns());
-    const Vector2d pixel{8.0 * (cell % columns) + 3, 8.0 * (cell / columns) + 4};
-    const double z = depth_at(cloud, image, pixel);
+    const double z = depth_at(cloud, image, pixel_of(cloud, cell, {3, 4}));
     const bool on_wall = z > 2.3;
     squares += z > 0 && on_wall ? std::pow(z - 2.5, 2) : 0;
     count += z > 0 && on_wall ? 1 : 0;
@@ -186,10 +195,8 @@ TEST(PixelDepth, IsThatOfTheSurfaceAndNoneOnItsEdge) {
   std::size_t edges = 0;
   for (std::uint32_t cell = 0; cell < cloud.grid().size(); ++cell) {
     if (!cloud.surfels()[cell].valid()) {
-      const auto columns = static_cast<std::uint32_t>(cloud.grid().columns());
       ++edges;
-      EXPECT_EQ(depth_at(cloud, image, {8.0 * (cell % columns) + 3, 8.0 * (cell / columns) + 4}),
-                0);
+      EXPECT_EQ(depth_at(cloud, image, pixel_of(cloud, cell, {3, 4})), 0);
     }
   }
   EXPECT_GT(edges, 50U);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
@@ -143,8 +144,7 @@ FrameRef render(const Scene& scene, const SE3& T_world_cam, const CameraIntrinsi
   std::mt19937_64 random{noise.seed};
   std::uniform_real_distribution<double> chance{0, 1};
   const std::vector<double> errors = noise_image(camera, noise, random);
-  auto* const pixels =
-      static_cast<std::uint16_t*>(static_cast<void*>(frame.writable_bytes().data()));
+  std::vector<std::uint16_t> pixels(errors.size());
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
       const std::size_t pixel = index_of(camera, u, v);
@@ -155,6 +155,7 @@ FrameRef render(const Scene& scene, const SE3& T_world_cam, const CameraIntrinsi
       pixels[pixel] = shown ? static_cast<std::uint16_t>(std::lround(counts)) : std::uint16_t{0};
     }
   }
+  std::ranges::copy(std::as_bytes(std::span{pixels}), frame.writable_bytes().begin());
   return frame;
 }
 

@@ -1,8 +1,6 @@
 #include "map/local_map.hpp"
 
-#include <cstddef>
 #include <cstdint>
-#include <utility>
 
 #include <gtest/gtest.h>
 

@@ -47,8 +47,9 @@ cv::Mat1b TexturedWall::seen_from(const SE3& T_odom_cam) const {
     for (int u = 0; u < image.cols; ++u) {
       double sum = 0;
       for (int i = 0; i < kSubpixels * kSubpixels; ++i) {
-        const Vector2d within{(i % kSubpixels + 0.5) / kSubpixels - 0.5,
-                              (i / kSubpixels + 0.5) / kSubpixels - 0.5};
+        const int right = i % kSubpixels;
+        const int down = i / kSubpixels;
+        const Vector2d within{(right + 0.5) / kSubpixels - 0.5, (down + 0.5) / kSubpixels - 0.5};
         const Vector3d p_odom = point_at(T_odom_cam, Vector2d{u, v} + within);
         sum += gray_at(p_odom.x(), p_odom.y());
       }

@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -28,7 +27,6 @@
 namespace geoflow::tools {
 namespace {
 
-using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -41,6 +39,7 @@ const std::string map_key = "slam.switches.depth_to_map";
 
 std::vector<std::string> names(const AblationRows& rows) {
   std::vector<std::string> all;
+  all.reserve(rows.available.size());
   for (const AblationRow& row : rows.available) {
     all.push_back(row.name);
   }

@@ -8,7 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
+#include <rapidcheck/gtest.h>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/evaluate/association.hpp"

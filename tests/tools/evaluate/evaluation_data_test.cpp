@@ -11,6 +11,7 @@
 #include "geoflow/tools/evaluate/alignment.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
+#include "geoflow/tools/evaluate/statistics.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"
 

@@ -11,7 +11,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
+#include <rapidcheck/gtest.h>
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
@@ -130,7 +130,7 @@ TEST(RelativeErrors, AreThoseOfTheMotionAndDoNotDependOnTheFrames) {
                       .estimate = pairs[2].estimate * error * T_ref2_refi,
                       .reference = pairs[i].reference};
         }
-        PosePairs moved = transformed({.T_ref_est = random_transform(random)}, pairs);
+        const PosePairs moved = transformed({.T_ref_est = random_transform(random)}, pairs);
         const IndexPairs all = stretches(moved, {.delta = 1, .unit = DeltaUnit::kFrames}).value();
         const PoseErrors errors = relative_errors(moved, all);
         for (std::size_t i = 0; i < all.size(); ++i) {

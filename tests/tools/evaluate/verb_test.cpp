@@ -1,8 +1,9 @@
 #include "geoflow/tools/verb.hpp"
 
-#include <cstddef>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <ios>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -18,6 +19,7 @@
 
 namespace geoflow::tools {
 
+// NOLINTNEXTLINE(misc-use-internal-linkage): the verb's library defines it
 std::unique_ptr<Verb> make_evaluate_verb();
 
 namespace {
@@ -45,6 +47,7 @@ class EvaluateVerbTest : public testing::Test {
   int run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"geoflow", "evaluate"});
     std::vector<const char*> argv;
+    argv.reserve(arguments.size());
     for (const std::string& argument : arguments) {
       argv.push_back(argument.c_str());
     }

@@ -37,10 +37,10 @@ std::uint32_t pixel_at(const std::filesystem::path& png, int x, int y) {
   cairo_surface_t* surface = cairo_image_surface_create_from_png(png.c_str());
   EXPECT_EQ(cairo_surface_status(surface), CAIRO_STATUS_SUCCESS);
   std::uint32_t value = 0;
-  std::memcpy(
-      &value,
-      cairo_image_surface_get_data(surface) + y * cairo_image_surface_get_stride(surface) + x * 4,
-      sizeof value);
+  const std::ptrdiff_t stride = cairo_image_surface_get_stride(surface);
+  std::memcpy(&value,
+              cairo_image_surface_get_data(surface) + y * stride + x * std::ptrdiff_t{sizeof value},
+              sizeof value);
   cairo_surface_destroy(surface);
   return value & 0xffffffU;
 }

@@ -59,7 +59,7 @@ inline std::uint16_t depth_mm(const Rendered& rendered, int x, int y) {
 }
 
 inline double blue(const Rendered& rendered, int x, int y) {
-  return rendered.color.row<std::uint8_t>(y)[3 * x];
+  return rendered.color.row<std::uint8_t>(y)[std::ptrdiff_t{3} * x];
 }
 
 inline double truth_m(const Rendered& rendered, int x, int y) {

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
@@ -109,7 +110,7 @@ TEST(Camera, SensorNoiseIsThatOfPhotonsAndGrowsWithGain) {
     Scene scene = daylight_scene();
     scene.daylight->sky_nit = sky_nit;
     add_wall(scene, 2.0F, -40, 40, 0.4F);
-    CameraOptions options;
+    const CameraOptions options;
     const Rendered rendered =
         make(scene, options)->render(0, 0, [](double) { return looking(0, 0, 0); });
     double sum = 0;

@@ -147,6 +147,7 @@ TEST(CameraTruth, AFrameWarpedByTheTruePosesIsTheTenthAfterIt) {
   const double measured_mm = 1e3 * median(errors.measured_m);
   const double exposure = median(errors.brightness_ratio);
   std::vector<double> brightness;
+  brightness.reserve(errors.brightness_ratio.size());
   for (const double ratio : errors.brightness_ratio) {
     brightness.push_back(std::abs(ratio / exposure - 1.0));
   }

@@ -19,9 +19,9 @@
 #include "camera_rig.hpp"
 #include "src/lighting.hpp"
 #include "src/ray_scene.hpp"
-#include "src/sender.hpp"
 #include "src/shader.hpp"
 #include "src/steady_tiles.hpp"
+#include "src/tiles.hpp"
 #include "src/view.hpp"
 
 // What the renderer leaves out, against what it would see with it.

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -140,7 +139,7 @@ TEST(LegSimulator, FootForceLagsAndHasAnOffsetByFoot) {
   for (std::size_t i = 2500; i + 20 < legs.size(); ++i) {
     const LegReading now = legs.reading(i);
     for (std::size_t l = 0; l < kLegCount; ++l) {
-      const double counts = static_cast<double>(now.sample.foot_force.at(l));
+      const auto counts = static_cast<double>(now.sample.foot_force.at(l));
       lowest.at(l) = std::min(lowest.at(l), counts);
       const double later = static_cast<double>(legs.reading(i + 12).sample.foot_force.at(l));
       product += now.truth.force_world.at(l).z() * counts;

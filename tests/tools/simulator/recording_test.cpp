@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <ios>
 #include <map>
 #include <sstream>
 #include <string>
@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -96,8 +97,7 @@ TEST(Arrivals, HaveTheirLatencyAndNeverOvertake) {
                                   .delay = {.latency_s = 0.01, .jitter_s = 0.004}};
   constexpr std::size_t kCount = 20'000;
   for (std::size_t i = 0; i < kCount; ++i) {
-    stream.measured.push_back(
-        HostTime{std::chrono::milliseconds{100 * i}});  // too far apart to meet
+    stream.measured.emplace_back(std::chrono::milliseconds{100 * i});  // too far apart to meet
   }
   std::vector<simulator::PlannedArrival> arrivals;
   plan_arrivals(stream, simulator::RandomStream{1, "test"}, arrivals);
@@ -119,7 +119,7 @@ TEST(Arrivals, HaveTheirLatencyAndNeverOvertake) {
 }
 
 TEST(BodyOdometry, HasTheNoiseThatWasAskedFor) {
-  simulator::RecordingOptions options;
+  const simulator::RecordingOptions options;
   const simulator::BodyOdometry odometry{5, options};
   simulator::BodyState body;
   body.T_world_base = SE3{so3::exp({0, 0, 1}), Vector3d::Zero()};
@@ -253,7 +253,8 @@ TEST(SimulatedRecording, AlsoAsTum) {
   EXPECT_EQ((*tum)->calibration().camera.fx, (*bag)->calibration().camera.fx);
   Recorder from_bag;
   Recorder from_tum;
-  for (auto& [streams, recorder] : {std::pair{&**bag, &from_bag}, std::pair{&**tum, &from_tum}}) {
+  for (const auto& [streams, recorder] :
+       {std::pair{&**bag, &from_bag}, std::pair{&**tum, &from_tum}}) {
     ASSERT_TRUE(streams->camera().start(*recorder));
     for (auto more = streams->step(); more && *more; more = streams->step()) {
     }

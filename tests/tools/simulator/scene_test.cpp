@@ -11,6 +11,9 @@
 
 #include <gtest/gtest.h>
 
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/tools/simulator/texture.hpp"
+
 namespace geoflow::simulator {
 namespace {
 
@@ -44,9 +47,11 @@ float clearance(const Scene& scene) {
     const int columns = 1 + static_cast<int>(std::ceil(patch.size_m.x() / kStep_m));
     const int rows = 1 + static_cast<int>(std::ceil(patch.size_m.y() / kStep_m));
     for (int i = 0; i <= columns * rows; ++i) {
-      const float u = patch.size_m.x() * static_cast<float>(i % columns) /
+      const int column = i % columns;
+      const int row = i / columns;
+      const float u = patch.size_m.x() * static_cast<float>(column) /
                       static_cast<float>(std::max(1, columns - 1));
-      const float v = patch.size_m.y() * static_cast<float>(i / columns) / static_cast<float>(rows);
+      const float v = patch.size_m.y() * static_cast<float>(row) / static_cast<float>(rows);
       const Vector3f point = patch.origin + u * patch.axis_u + v * patch.axis_v;
       if (in_the_way(point)) {
         least = std::min(least, distance_to_path(point.head<2>(), scene.waypoints));
@@ -161,8 +166,7 @@ TEST(Pedestrian, StandsOnTheFloorAndIsAsTallAsSaid) {
     float low = 10;
     float high = 0;
     for (const Capsule& part : walker.body(t_s)) {
-      low = std::min(
-          low, std::min(part.start.z() - part.start_radius_m, part.end.z() - part.end_radius_m));
+      low = std::min({low, part.start.z() - part.start_radius_m, part.end.z() - part.end_radius_m});
       high = std::max(high, part.end.z() + part.end_radius_m);
     }
     EXPECT_NEAR(low, 0.0F, 0.12F) << t_s;

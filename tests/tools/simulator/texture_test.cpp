@@ -70,7 +70,7 @@ TEST(Texture, TellsTheContrastThatAWindowSees) {
 }
 
 TEST(Texture, ShuffledCopiesDiffer) {
-  std::vector<Rgb> pixels = stripes(64, 64);
+  const std::vector<Rgb> pixels = stripes(64, 64);
   const Texture texture{pixels, 64, 1.0F, Repeat::kShuffle};
   int bright = 0;
   for (int copy = 0; copy < 100; ++copy) {
@@ -86,7 +86,7 @@ TEST(Random, NormalsHaveMeanZeroAndVarianceOne) {
   double sum = 0;
   double squares = 0;
   for (int i = 0; i < kCount; ++i) {
-    const double value = static_cast<double>(random.normal());
+    const auto value = static_cast<double>(random.normal());
     sum += value;
     squares += value * value;
   }

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 
