@@ -11,7 +11,6 @@
 #include <utility>
 
 #include <pthread.h>
-#include <sys/resource.h>
 #include <tbb/task_arena.h>
 #include <tl/expected.hpp>
 
@@ -21,6 +20,7 @@
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/thread.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/mapping.hpp"
@@ -56,13 +56,6 @@ struct Bells {
     return Bells{.sync = std::move(*sync), .slam = std::move(*slam), .map = std::move(*map)};
   }
 };
-
-/// Lets all other threads go before the calling one, here and in other processes. To give way needs
-/// no privilege.
-void give_way() {
-  constexpr int kNice = 10;
-  ::setpriority(PRIO_PROCESS, 0, kNice);  // to Linux, 0 is this thread
-}
 
 }  // namespace
 

@@ -18,6 +18,7 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/thread.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "replay/decode.hpp"
@@ -78,6 +79,7 @@ DecodeStatistics Prefetcher::statistics() const {
 }
 
 void Prefetcher::run(const std::stop_token& stop) {
+  give_way();  // it is ahead of its taker
   bool last = false;
   while (!last) {
     Prefetched item = read_one();
