@@ -11,7 +11,6 @@
 #include <utility>
 
 #include <pthread.h>
-#include <tbb/task_arena.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
@@ -209,17 +208,14 @@ class Pipeline::Implementation {
     }
   }
 
-  /// A frame must not wait for the map: on this thread, at low priority, and without TBB's threads,
-  /// which would not have it.
+  /// At low priority: a frame must not wait for the map.
   void map(const std::stop_token& stop) {
     give_way();
-    tbb::task_arena alone{1};
     bool stopped = false;
     while (!stopped) {
       if (const auto task = tasks_.try_pop()) {
         // One task is out at a time, so there is room for its result.
-        (void)results_.try_push(
-            alone.execute([&] { return slam::optimise(*task, &run_.statistics->mapping); }));
+        (void)results_.try_push(slam::optimise(*task, &run_.statistics->mapping));
         bells_.slam.ring();
         stopped = stop.stop_requested();
       } else {

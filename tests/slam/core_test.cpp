@@ -17,6 +17,7 @@
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/trajectory.hpp"
 
 #include "vision/textured_wall.hpp"
 
@@ -55,16 +56,16 @@ TEST(Core, ThePoseDoesNotWaitForItsKeyframeNorDependOnWhenThatIsMade) {
   const auto at_once = Core::create(calibration, {}).value();
   const auto late = Core::create(calibration, {}).value();
   for (const SyncedPacket& packet : walk_along_a_wall()) {
-    const SE3 T_at_once = at_once->process(packet).T_odom_base;
+    const PoseEstimate expected = at_once->process(packet);
     at_once->extend_map();
     const PoseEstimate estimate = late->process(packet);
     EXPECT_EQ(estimate.status, TrackingStatus::kTracking);
-    EXPECT_EQ(estimate.T_odom_base.translation(), T_at_once.translation());
-    EXPECT_EQ(estimate.T_odom_base.rotation().coeffs(), T_at_once.rotation().coeffs());
+    EXPECT_EQ(estimate.T_odom_base.translation(), expected.T_odom_base.translation());
+    EXPECT_EQ(estimate.T_odom_base.rotation().coeffs(), expected.T_odom_base.rotation().coeffs());
   }
   const double way = kStepM * (kFrames - 1);
-  const SE3 T_odom_last = late->final_trajectory().back().pose;
-  EXPECT_NEAR(T_odom_last.translation().norm(), way, 0.05 * way);
+  const Trajectory trajectory = late->final_trajectory();
+  EXPECT_NEAR(trajectory.back().pose.translation().norm(), way, 0.05 * way);
   // Within 22 cm there is more than the first keyframe.
   EXPECT_TRUE(at_once->take_mapping_task().has_value());
   EXPECT_TRUE(late->take_mapping_task().has_value());
