@@ -158,8 +158,9 @@ class Core::Impl {
   }
 
   PoseEstimate follow(const SyncedPacket& packet, const std::optional<ReckonedMotion>& motion) {
-    const TrackingResult result =
-        tracker_.track(map_, motion_.predict(packet.t, motion), source_of(motion));
+    const TrackingResult result = tracker_.track(map_, {.prior = motion_.predict(packet.t, motion),
+                                                        .by = source_of(motion),
+                                                        .since_keyframe = since_keyframe()});
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
     const bool fixed = result.anchored && (result.visual_fix || result.depth_fix);
     frames_lost_ = fixed ? 0 : frames_lost_ + 1;
@@ -241,6 +242,15 @@ class Core::Impl {
     return A * reference.covariance * A.transpose() + drift_;
   }
 
+  [[nodiscard]] std::optional<PosePrior> since_keyframe() const {
+    if (!since_keyframe_ || !since_keyframe_->legs) {
+      return std::nullopt;
+    }
+    const SE3& T_odom_cam0 = map_.keyframe(reference_).T_odom_cam;
+    return PosePrior{.T_odom_cam = T_odom_cam0 * since_keyframe_->T_cam0_cam1,
+                     .information = inverse(since_keyframe_->covariance)};
+  }
+
   static PoseSource source_of(const std::optional<ReckonedMotion>& motion) {
     if (!motion) {
       return PoseSource::kConstantVelocity;
@@ -287,7 +297,7 @@ class Core::Impl {
                        .information = inverse(since_keyframe_->covariance)});
       }
     }
-    since_keyframe_.emplace();
+    since_keyframe_ = ReckonedMotion{.T_cam0_cam1 = SE3{}, .legs = true};
   }
 
   Config config_;

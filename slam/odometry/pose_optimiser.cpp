@@ -40,12 +40,13 @@ struct PoseOptimiser::System {
   std::uint32_t depth_inliers = 0;
 };
 
-std::vector<VisualMatch> PoseOptimiser::expected(const PoseProblem& problem) const {
+std::vector<VisualMatch> PoseOptimiser::expected(std::span<const VisualMatch> matches,
+                                                 const PosePrior& belief) const {
   constexpr double kChi2Of2At999Permille = 13.8;
-  const SE3 T_cam_odom = problem.prior.T_odom_cam.inverse();
-  const Matrix6d P = inverse(problem.prior.information);
+  const SE3 T_cam_odom = belief.T_odom_cam.inverse();
+  const Matrix6d P = inverse(belief.information);
   std::vector<VisualMatch> found;
-  for (const VisualMatch& match : problem.matches) {
+  for (const VisualMatch& match : matches) {
     const Vector3d p_cam = T_cam_odom * match.p_odom;
     if (p_cam.z() < kMinimumDepthM) {
       continue;
@@ -148,10 +149,10 @@ void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
 PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) const {
   constexpr double kConverged = 1e-5;  // [rad], [m]
   PoseSolution solution;
-  const std::vector<VisualMatch> gated =
-      whole.gate_by_prior ? expected(whole) : std::vector<VisualMatch>{};
+  std::vector<VisualMatch> gated;
   PoseProblem problem = whole;
-  if (whole.gate_by_prior) {
+  if (whole.reckoned) {
+    gated = expected(whole.matches, *whole.reckoned);
     problem.matches = gated;
   }
   solution.T_odom_cam = start;

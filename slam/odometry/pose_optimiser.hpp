@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,9 +40,10 @@ struct PoseProblem {
   const DepthCloud* cloud = nullptr;  ///< the frame's own depth; null: none
   std::span<const DepthTarget> targets;
   PosePrior prior;  ///< the prediction: decides what nothing else sees
-  /// Leaves out matches that contradict the prior, for one that legs and IMU make: things that move
-  /// by themselves, and mirror images.
-  bool gate_by_prior = false;
+  /// Where legs and IMU alone see the camera, from the last keyframe on: matches that contradict it
+  /// are left out. Things that move by themselves do, and mirror images: those follow the camera by
+  /// so little in each frame that only the whole way tells them from what they are seen on.
+  std::optional<PosePrior> reckoned{};
 };
 
 struct PoseSolution {
@@ -76,8 +78,9 @@ class PoseOptimiser {
 
  private:
   struct System;
-  /// The matches that the prior allows, by chi-squared at 99.9 %.
-  [[nodiscard]] std::vector<VisualMatch> expected(const PoseProblem& problem) const;
+  /// The matches that a belief allows, by chi-squared at 99.9 %.
+  [[nodiscard]] std::vector<VisualMatch> expected(std::span<const VisualMatch> matches,
+                                                  const PosePrior& belief) const;
   [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
   void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
                   System& system) const;

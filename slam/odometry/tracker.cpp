@@ -316,14 +316,15 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   return targets;
 }
 
-TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predicted_by) {
+TrackingResult Tracker::track(Map& map, const Prediction& predicted) {
+  const PosePrior& prior = predicted.prior;
   TrackingResult result;
   const bool blind = is_blind(prior);
   // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image. But they
   // drift, so that a camera which sees again has to be looked for in the map.
-  const bool reckoned = predicted_by == PoseSource::kLegs && fixed_;
+  const bool reckoned = predicted.by == PoseSource::kLegs && fixed_;
   const InitialPose initial = first_guess(
-      map, {.T_odom_cam = prior.T_odom_cam, .source = predicted_by, .sure = reckoned}, blind);
+      map, {.T_odom_cam = prior.T_odom_cam, .source = predicted.by, .sure = reckoned}, blind);
   result.source = initial.source;
   result.sure = initial.sure;
   result.anchored = current_.anchored;
@@ -333,12 +334,13 @@ TrackingResult Tracker::track(Map& map, const PosePrior& prior, PoseSource predi
   const std::vector<VisualMatch> visual = matches(map, &feature_of_match);
   const std::vector<DepthTarget> targets =
       depth_targets(map, initial.T_odom_cam, blind, result.overlap);
-  result.solution = optimiser_.solve({.matches = visual,
-                                      .cloud = current_.cloud.get(),
-                                      .targets = targets,
-                                      .prior = prior,
-                                      .gate_by_prior = initial.source == PoseSource::kLegs},
-                                     initial.T_odom_cam);
+  result.solution = optimiser_.solve(
+      {.matches = visual,
+       .cloud = current_.cloud.get(),
+       .targets = targets,
+       .prior = prior,
+       .reckoned = initial.source == PoseSource::kLegs ? predicted.since_keyframe : std::nullopt},
+      initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
   result.covariance = initial.sure ? result.solution.covariance : inverse(prior.information);
   keep_inliers(map, feature_of_match, result.solution);

@@ -41,6 +41,14 @@ struct TrackingResult {
   double overlap = 0;  ///< largest share of the frame's depth that one keyframe sees too, 0 to 1
 };
 
+/// What is known of a frame's pose before it is looked at.
+struct Prediction {
+  PosePrior prior;  ///< from the frame before
+  PoseSource by{};  ///< what made it
+  /// By legs and IMU alone from the last keyframe on; none where they do not know all of the way.
+  std::optional<PosePrior> since_keyframe{};
+};
+
 /// Follows the camera from frame to frame against a map that others build: predict, track,
 /// initialise, optimise, in the paper's order (sections IV-A to IV-C). Thread-bound.
 class Tracker {
@@ -55,9 +63,9 @@ class Tracker {
   /// read on a thread of TBB's from now on; whatever needs it waits for it.
   void begin_frame(const SyncedPacket& packet);
 
-  /// Pose of the current frame, given its prediction and what made it. Features that contradict it
-  /// are dropped from the frame.
-  [[nodiscard]] TrackingResult track(Map& map, const PosePrior& prior, PoseSource predicted_by);
+  /// Pose of the current frame, given its prediction. Features that contradict it are dropped from
+  /// the frame.
+  [[nodiscard]] TrackingResult track(Map& map, const Prediction& predicted);
 
   /// Waits until the frame is read.
   [[nodiscard]] Frame& current() {
