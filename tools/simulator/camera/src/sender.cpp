@@ -34,7 +34,7 @@ constexpr unsigned kPlaceBits = 10;  // of a random place within a stratum
   constexpr unsigned kByteBits = 8;
   const int turn = (static_cast<int>((bits >> shift) & kByte) * parts) >> kByteBits;
   const int at = part + turn;
-  return at >= parts ? at - parts : at;
+  return at - (at >= parts ? parts : 0);
 }
 
 }  // namespace
@@ -88,6 +88,8 @@ void Sender::aim_tile(const Tile& tile, const PixelBits& pixels, int part, const
   constexpr std::uint32_t kPartStep = 0x9e3779b9U;  // 2^32 over the golden ratio
   constexpr unsigned kByteBits = 8;
   with_wide_vectors([&]() __attribute__((always_inline)) {
+    // Copies, because what lies behind a reference might change with every ray that is written.
+    const int number = part;
     const int parts = sampling_.rays_a_pixel;
     const float inverse_parts = 1.0F / static_cast<float>(parts);
     const auto exposure_s = static_cast<float>(shutter_.exposure_s);
@@ -96,22 +98,31 @@ void Sender::aim_tile(const Tile& tile, const PixelBits& pixels, int part, const
     const Eigen::Matrix3f turn = leg.change.R_world_cam;
     const Vector3f origin = leg.begin.p_world_cam;
     const Vector3f shift = leg.change.p_world_cam;
+    const Pinhole pinhole = pinhole_;
+    const float begin_s = leg.begin_s;
+    const float inverse_span = leg.inverse_span;
+    const float ray_time_begin = ray_time_begin_;
+    const float ray_time_per_s = ray_time_per_s_;
+    const int left = tile.left;
+    const int top = tile.top;
+    const int last_row = shutter_.rows - 1;
     auto& ray = packet.ray;
     for (std::size_t i = 0; i < kPacket; ++i) {
-      const int column = tile.left + static_cast<int>(i % kTile);
-      const int row = std::min(tile.top + static_cast<int>(i / kTile), shutter_.rows - 1);
+      const int column = left + static_cast<int>(i % kTile);
+      const int below = top + static_cast<int>(i / kTile);
+      const int row = below < last_row ? below : last_row;
       const std::uint32_t pixel = pixels[i];
-      const std::uint32_t bits = scramble32(pixel + static_cast<std::uint32_t>(part) * kPartStep);
-      const auto stratum_x = static_cast<float>(turned(part, parts, pixel, 0));
-      const auto stratum_y = static_cast<float>(turned(part, parts, pixel, kByteBits));
-      order[i] = turned(part, parts, pixel, 2 * kByteBits);
+      const std::uint32_t bits = scramble32(pixel + static_cast<std::uint32_t>(number) * kPartStep);
+      const auto stratum_x = static_cast<float>(turned(number, parts, pixel, 0));
+      const auto stratum_y = static_cast<float>(turned(number, parts, pixel, kByteBits));
+      order[i] = turned(number, parts, pixel, 2 * kByteBits);
       const float dx = (stratum_x + place(bits, 0)) * inverse_parts - 0.5F;
       const float dy = (stratum_y + place(bits, kPlaceBits)) * inverse_parts - 0.5F;
-      const float when = (static_cast<float>(part) + place(bits, 2 * kPlaceBits)) * inverse_parts;
+      const float when = (static_cast<float>(number) + place(bits, 2 * kPlaceBits)) * inverse_parts;
       const float t_s = exposure_s * when + row_s * (static_cast<float>(row) + 0.5F);
-      const float share = (t_s - leg.begin_s) * leg.inverse_span;
-      const float x = (static_cast<float>(column) + dx - pinhole_.cx) * pinhole_.inverse_fx;
-      const float y = (static_cast<float>(row) + dy - pinhole_.cy) * pinhole_.inverse_fy;
+      const float share = (t_s - begin_s) * inverse_span;
+      const float x = (static_cast<float>(column) + dx - pinhole.cx) * pinhole.inverse_fx;
+      const float y = (static_cast<float>(row) + dy - pinhole.cy) * pinhole.inverse_fy;
       const auto towards = [&](int axis) __attribute__((always_inline)) {
         return from(axis, 0) * x + from(axis, 1) * y + from(axis, 2) +
                share * (turn(axis, 0) * x + turn(axis, 1) * y + turn(axis, 2));
@@ -122,7 +133,7 @@ void Sender::aim_tile(const Tile& tile, const PixelBits& pixels, int part, const
       ray.dir_x[i] = towards(0);
       ray.dir_y[i] = towards(1);
       ray.dir_z[i] = towards(2);
-      ray.time[i] = held(ray_time_begin_ + ray_time_per_s_ * t_s, 0.0F, 1.0F);
+      ray.time[i] = held(ray_time_begin + ray_time_per_s * t_s, 0.0F, 1.0F);
     }
   });
 }

@@ -124,7 +124,8 @@ Shader::Hits Shader::meet(const Patch& patch, const RayPacket& packet, const Loo
   hits.facing = normal.dot(direction_of(packet, lane)) > 0 ? -1.0F : 1.0F;
   const float inverse_rays = 1.0F / static_cast<float>(look.rays_a_pixel);
   with_wide_vectors([&]() __attribute__((always_inline)) {
-    const auto& ray = packet.ray;
+    // A copy: GCC makes no vectors of what it loads through a constant reference in here.
+    const RTCRay16 ray = packet.ray;
     const float origin_u = patch.origin.dot(patch.axis_u);
     const float origin_v = patch.origin.dot(patch.axis_v);
     const float ux = patch.axis_u.x();
