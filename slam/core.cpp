@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -20,11 +21,13 @@
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/slam/config.hpp"
 #include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/saved_map.hpp"
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/cell_grid.hpp"
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
+#include "map/followed_frames.hpp"
 #include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
@@ -34,6 +37,7 @@
 #include "odometry/tracker.hpp"
 #include "optimisation/matrix6.hpp"
 #include "place/loop_closer.hpp"
+#include "storage/stored_map.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -42,12 +46,16 @@ namespace {
 /// new part of it, tied to the old one by nothing but what was dead-reckoned in between.
 constexpr int kLostFrames = 15;
 
+/// Depth of a saved map is read where the camera comes near it: with each keyframe some.
+constexpr double kNearM = 4;
+constexpr std::size_t kCloudsAtOnce = 8;
+
 }  // namespace
 
 class Core::Impl {
  public:
   Impl(const Calibration& calibration, const Config& config, std::shared_ptr<const CellGrid> grid,
-       StageObserver* observer)
+       StageObserver* observer, const StoredMap* saved)
       : config_{config},
         calibration_{calibration},
         T_base_cam_{calibration.T_base_cam.value_or(SE3{})},
@@ -55,6 +63,7 @@ class Core::Impl {
         tracker_{config, gicp_, calibration, std::move(grid), observer},
         builder_{config, gicp_, calibration, observer},
         loop_closer_{config, gicp_, calibration},
+        map_{saved == nullptr ? Map{} : Map{saved->contents}},
         observer_{observer} {}
 
   PoseEstimate process(const SyncedPacket& packet) {
@@ -65,7 +74,7 @@ class Core::Impl {
     }
     const std::optional<ReckonedMotion> motion = reckoner_.add(packet);
     tracker_.begin_frame(packet);
-    if (map_.keyframes().empty()) {
+    if (frames_.empty()) {
       return start(packet);
     }
     since_keyframe_ =
@@ -76,8 +85,7 @@ class Core::Impl {
   void extend_map() {
     if (const auto covariance = std::exchange(keyframe_due_, std::nullopt)) {
       insert_keyframe(*covariance);
-      records_.back().reference = reference_;
-      records_.back().T_reference_cam = SE3{};
+      frames_.newest_is(reference_);
     }
   }
 
@@ -92,7 +100,7 @@ class Core::Impl {
     }
     const KeyframeId newest = *pending_;
     pending_.reset();
-    MappingTask task = builder_.task(map_, newest);
+    MappingTask task = map_.begins_thread(newest) ? MappingTask{} : builder_.task(map_, newest);
     if (config_.switches.loop_closing) {
       task.loops = loop_closer_.problem(map_, newest);
     }
@@ -105,30 +113,45 @@ class Core::Impl {
     }
     if (result.loops) {
       for (const RelativeEdge& loop : loop_closer_.consider(map_, *result.loops)) {
-        loop_found_ = loop_found_ || moves_map(map_, loop);
-        map_.add_edge(loop);
+        if (map_.same_part(loop.from, loop.to)) {
+          loop_found_ = loop_found_ || moves_map(map_, loop);
+          map_.add_edge(loop);
+        } else {
+          join(loop);
+        }
       }
     }
     if (result.graph) {
       // The map moves, and the robot in it; where it is in odom stays as it is.
       if (const std::optional<SE3> T_map1_map0 = correct(map_, *result.graph)) {
-        move(*T_map1_map0);
-        T_map_odom_ = *T_map1_map0 * T_map_odom_;
+        move_in_map(*T_map1_map0);
       }
     }
   }
 
   [[nodiscard]] Trajectory final_trajectory() const {
-    Trajectory trajectory;
-    const SE3 T_cam_base = T_base_cam_.inverse();
-    for (const FrameRecord& record : records_) {
-      const SE3& T_odom_reference = map_.keyframe(record.reference).T_odom_cam;
-      trajectory.push_back({record.t, T_odom_reference * record.T_reference_cam * T_cam_base});
-    }
-    return trajectory;
+    return frames_.trajectory(map_, T_base_cam_);
+  }
+
+  [[nodiscard]] std::shared_ptr<const StoredMap> snapshot() const {
+    return std::make_shared<const StoredMap>(slam::snapshot(map_, calibration_));
   }
 
  private:
+  /// Ties the part of a new keyframe to the one in which it has found its place.
+  void join(const RelativeEdge& tie) {
+    const bool here = map_.keyframe(tie.to).part == map_.newest_part();
+    const SE3 T_map1_map0 = map_.join(tie);
+    if (here) {
+      move_in_map(T_map1_map0);
+    }
+  }
+
+  void move_in_map(const SE3& T_map1_map0) {
+    move(T_map1_map0);
+    T_map_odom_ = T_map1_map0 * T_map_odom_;
+  }
+
   /// Moves what depends on the newest keyframes.
   void move(const SE3& T_odom1_odom0) {
     tracker_.current().T_odom_cam = T_odom1_odom0 * tracker_.current().T_odom_cam;
@@ -136,22 +159,14 @@ class Core::Impl {
     T_odom_cam_ = T_odom1_odom0 * T_odom_cam_;
   }
 
-  /// A frame's pose relative to a keyframe, so that it follows when the keyframe is moved by later
-  /// optimisation.
-  struct FrameRecord {
-    HostTime t;
-    KeyframeId reference;
-    SE3 T_reference_cam;
-  };
-
   PoseEstimate start(const SyncedPacket& packet) {
     Frame& frame = tracker_.current();
     frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
     motion_.update(packet.t, frame.T_odom_cam, Matrix6d::Zero(), true);
     insert_keyframe(Matrix6d::Zero());
-    records_.push_back({packet.t, reference_, SE3{}});
+    frames_.add(packet.t, reference_, SE3{});
     PoseEstimate estimate = estimate_at(packet, frame.T_odom_cam);
-    estimate.status = TrackingStatus::kTracking;
+    estimate.status = fixed_status();
     estimate.source = PoseSource::kNone;
     last_ = estimate;
     return estimate;
@@ -179,14 +194,15 @@ class Core::Impl {
     const Matrix6d covariance = covariance_in_odom(T_odom_cam, result);
     const Matrix6d A = T_base_cam_.adjoint();
     estimate.covariance = A * covariance * A.transpose();
-    estimate.status = fixed ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
+    estimate.status = fixed ? fixed_status() : TrackingStatus::kDegraded;
     estimate.quality = quality(result);
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       keyframe_due_ = covariance;
+      // Legs tie what they were heard all the way between; without them nothing does.
+      part_due_ = begin_anew && !(since_keyframe_ && since_keyframe_->legs);
     }
     estimate.reset_counter = reset_counter_;
-    records_.push_back(
-        {packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam});
+    frames_.add(packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam);
     last_ = estimate;
     return estimate;
   }
@@ -198,7 +214,7 @@ class Core::Impl {
     estimate.sequence = packet.sequence;
     estimate.source = PoseSource::kConstantVelocity;
     estimate.quality = 0;
-    if (map_.keyframes().empty()) {
+    if (frames_.empty()) {
       estimate.status = TrackingStatus::kInitialising;
       return estimate;
     }
@@ -210,8 +226,15 @@ class Core::Impl {
   /// The estimator's own frame is the map, though its name within is odom: there is but one. To
   /// others the odom frame is where it would be had no loop been closed.
   void place(PoseEstimate& estimate, const SE3& T_map_cam) const {
+    estimate.map_id = static_cast<std::uint32_t>(map_.newest_part());
     estimate.T_map_odom = T_map_odom_;
     estimate.T_odom_base = T_map_odom_.inverse() * (T_map_cam * T_base_cam_.inverse());
+  }
+
+  /// Of a frame that something seen has fixed: in a part that is tied to nothing older, the place
+  /// in the map is still looked for.
+  [[nodiscard]] TrackingStatus fixed_status() const {
+    return map_.is_tied() ? TrackingStatus::kTracking : TrackingStatus::kRelocalising;
   }
 
   [[nodiscard]] PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {
@@ -286,6 +309,10 @@ class Core::Impl {
 
   void insert_keyframe(const Matrix6d& covariance) {
     const StageScope scope{observer_, Stage::kKeyframe};
+    if (std::exchange(part_due_, false)) {
+      map_.begin_part();
+      since_keyframe_.reset();
+    }
     const KeyframeId before = reference_;
     reference_ = builder_.insert(map_, tracker_.current(), covariance);
     if (map_.keyframes().size() > 1) {
@@ -298,6 +325,7 @@ class Core::Impl {
       }
     }
     since_keyframe_ = ReckonedMotion{.T_cam0_cam1 = SE3{}, .legs = true};
+    map_.read_clouds_near(reference_, kNearM, kCloudsAtOnce);
   }
 
   Config config_;
@@ -314,9 +342,10 @@ class Core::Impl {
   std::optional<Matrix6d> keyframe_due_;  ///< covariance of the last frame, which is to become one
   std::optional<KeyframeId> pending_;
   std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
-  bool loop_found_ = false;                       ///< the map is to be corrected
-  SE3 T_map_odom_;                                ///< what closed loops have moved the map by
-  std::vector<FrameRecord> records_;
+  bool part_due_ = false;    ///< the last frame, which is to become a keyframe, begins one
+  bool loop_found_ = false;  ///< the map is to be corrected
+  SE3 T_map_odom_;           ///< what closed loops have moved the map by
+  FollowedFrames frames_;
   PoseEstimate last_;
   SE3 T_odom_cam_;                     ///< of the last frame
   Matrix6d drift_ = Matrix6d::Zero();  ///< of the last frame in respect of the map
@@ -329,13 +358,13 @@ Core::Core(std::unique_ptr<Impl> impl) : impl_{std::move(impl)} {}
 Core::~Core() = default;
 
 Result<std::unique_ptr<Core>> Core::create(const Calibration& calibration, const Config& config,
-                                           StageObserver* observer) {
+                                           StageObserver* observer, const StoredMap* saved) {
   auto grid = CellGrid::create(calibration.camera, DepthCloudConfig{}.cell_px);
   if (!grid) {
     return tl::unexpected{std::move(grid).error()};
   }
   return std::make_unique<Core>(
-      std::make_unique<Impl>(calibration, config, *std::move(grid), observer));
+      std::make_unique<Impl>(calibration, config, *std::move(grid), observer, saved));
 }
 
 PoseEstimate Core::process(const SyncedPacket& packet) {
@@ -349,6 +378,9 @@ std::optional<MappingTask> Core::take_mapping_task() {
 }
 void Core::apply(const MappingResult& result) {
   impl_->apply(result);
+}
+std::shared_ptr<const StoredMap> Core::snapshot() const {
+  return impl_->snapshot();
 }
 Trajectory Core::final_trajectory() const {
   return impl_->final_trajectory();

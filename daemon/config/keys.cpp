@@ -132,6 +132,10 @@ void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
   keys.push_back({"pipeline.sample_queue", &c.sample_queue, 16, 65536});
 }
 
+void bind_map(MapConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"map.file", &c.file});
+}
+
 }  // namespace
 
 std::vector<Key> bind_keys(Config& config) {
@@ -142,6 +146,7 @@ std::vector<Key> bind_keys(Config& config) {
   bind_slam(config.slam, keys);
   bind_socket(config.socket, keys);
   bind_pipeline(config.pipeline, keys);
+  bind_map(config.map, keys);
   return keys;
 }
 

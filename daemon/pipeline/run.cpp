@@ -11,8 +11,10 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/slam/core.hpp"
+#include "geoflow/slam/saved_map.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -41,6 +43,19 @@ void keep_freed_memory() {
   // NOLINTEND(concurrency-mt-unsafe)
 }
 
+/// The configured map; null where none is.
+Result<std::shared_ptr<const slam::StoredMap>> saved_map(const MapConfig& config,
+                                                         const Calibration& calibration) {
+  if (config.file.empty()) {
+    return nullptr;
+  }
+  return slam::load_map(config.file).and_then([&](auto map) {
+    return slam::made_with(*map, calibration).map([&] { return map; }).map_error([&](Error error) {
+      return std::move(error).in(config.file.string());
+    });
+  });
+}
+
 }  // namespace
 
 Result<Run> open_run(const Config& config) {
@@ -55,8 +70,12 @@ Result<Run> open_run(const Config& config) {
   }
   run.streams = std::move(*streams);
   run.statistics = std::make_unique<RunStatistics>();
-  auto core =
-      slam::Core::create(run.streams->calibration(), config.slam, &run.statistics->tracking);
+  auto map = saved_map(config.map, run.streams->calibration());
+  if (!map) {
+    run.map_refused = std::move(map.error());
+  }
+  auto core = slam::Core::create(run.streams->calibration(), config.slam, &run.statistics->tracking,
+                                 map ? map->get() : nullptr);
   if (!core) {
     return tl::unexpected{std::move(core.error())};
   }

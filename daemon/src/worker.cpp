@@ -2,7 +2,9 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -23,6 +25,8 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/slam/core.hpp"
+#include "geoflow/slam/saved_map.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
 namespace geoflow::daemon {
@@ -36,6 +40,9 @@ Result<std::unique_ptr<Worker>> Worker::start(const Config& config, timesync::Do
   auto run = open_run(config);
   if (!run) {
     return tl::unexpected{std::move(run.error())};
+  }
+  if (const std::optional<Error>& refused = run->map_refused) {
+    log::warning("map", "begins without a saved map: {}", refused->message);
   }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
   std::unique_ptr<Worker> worker{new Worker{config, bell, earlier_resets, std::move(*run)}};
@@ -95,6 +102,21 @@ void Worker::stop() {
   if (lock_step_.joinable()) {
     lock_step_.request_stop();
     lock_step_.join();
+  }
+  if (!std::exchange(map_saved_, true)) {
+    save_map();
+  }
+}
+
+void Worker::save_map() {
+  const std::filesystem::path& file = config_.map.file;
+  // What was refused may be somebody's; only where nothing was, a new map may be.
+  if (file.empty() || (run_.map_refused && run_.map_refused->code != ErrorCode::kNotFound)) {
+    return;
+  }
+  const auto saved = slam::save_map(*run_.core->snapshot(), file);
+  if (!saved) {
+    log::error("map", "not saved: {}", saved.error().message);
   }
 }
 

@@ -38,7 +38,7 @@ class Worker {
   [[nodiscard]] std::optional<geoflow_pose> take_pose() { return newest_.take_new(); }
   /// True when the source has ended; the last pose can then be taken.
   [[nodiscard]] bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
-  /// Ends all its threads.
+  /// Ends all its threads and, the first time, saves the configured map.
   void stop();
 
   /// For the status reply.
@@ -52,6 +52,7 @@ class Worker {
   [[nodiscard]] Result<void> launch();
   void publish(const SyncedPacket& packet, const PoseEstimate& estimate);
   void end();
+  void save_map();
 
   const Config& config_;
   timesync::Doorbell& bell_;
@@ -61,6 +62,7 @@ class Worker {
   std::atomic<bool> ended_{false};
   std::unique_ptr<Pipeline> pipeline_;
   std::jthread lock_step_;
+  bool map_saved_ = false;
 };
 
 }  // namespace geoflow::daemon

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "geoflow/hal/calibration.hpp"
@@ -143,6 +144,18 @@ DepthCloud::DepthCloud(std::shared_ptr<const CellGrid> grid, const Pixels& pixel
   valid_.reserve(grid_->size());
   smoothed_.reserve(grid_->size());
   columns_.resize(kColumnSums * static_cast<std::size_t>(grid_->columns() * grid_->cell_px()));
+}
+
+std::shared_ptr<const DepthCloud> DepthCloud::restored(std::shared_ptr<const CellGrid> grid,
+                                                       const Pixels& pixels, float sigma,
+                                                       std::span<const Stored> surfels) {
+  auto cloud = std::make_shared<DepthCloud>(std::move(grid), pixels, DepthCloudConfig{});
+  cloud->sigma_ = sigma;
+  for (const Stored& stored : surfels) {
+    cloud->surfels_[stored.cell] = stored.surfel;
+    cloud->valid_.push_back(stored.cell);
+  }
+  return cloud;
 }
 
 Result<void> DepthCloud::build(const FrameRef& depth) {

@@ -62,6 +62,17 @@ class DepthCloud {
   DepthCloud(std::shared_ptr<const CellGrid> grid, const Pixels& pixels,
              const DepthCloudConfig& config);
 
+  /// A surfel and its cell.
+  struct Stored {
+    std::uint32_t cell = 0;
+    Surfel surfel;
+  };
+  /// The cloud that has these surfels and this sigma(), as it was. Cells ascend and are of the
+  /// grid.
+  [[nodiscard]] static std::shared_ptr<const DepthCloud> restored(
+      std::shared_ptr<const CellGrid> grid, const Pixels& pixels, float sigma,
+      std::span<const Stored> surfels);
+
   /// Replaces the content by that of a kDepth16 image of the camera's size; anything else is
   /// kInvalidArgument and leaves the cloud empty. An image without usable depth gives an empty
   /// cloud.

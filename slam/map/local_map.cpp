@@ -39,10 +39,12 @@ LocalMap::LocalMap(const Map& map, KeyframeId newest) : newest_{newest} {
       linked_.insert(id);
     }
   }
-  for (const RelativeEdge& edge : map.edges()) {
-    if (tied(edge.from) || tied(edge.to)) {
-      linked_.insert(edge.from);
-      linked_.insert(edge.to);
+  for (const auto* edges : {&map.edges(), &map.joins()}) {
+    for (const RelativeEdge& edge : *edges) {
+      if (tied(edge.from) || tied(edge.to)) {
+        linked_.insert(edge.from);
+        linked_.insert(edge.to);
+      }
     }
   }
 }

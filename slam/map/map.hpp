@@ -12,6 +12,7 @@
 
 #include "cloud/depth_cloud.hpp"
 #include "map/ids.hpp"
+#include "map/stored_cloud.hpp"
 #include "place/place_index.hpp"
 #include "vision/orb_features.hpp"
 
@@ -40,8 +41,8 @@ struct MapPoint {
 /// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); from
 /// IMU and legs in between; or from both views, where a loop closes.
 struct RelativeEdge {
-  KeyframeId from;
-  KeyframeId to;
+  KeyframeId from{};
+  KeyframeId to{};
   SE3 T_from_to;
   Matrix6d information = Matrix6d::Zero();  ///< of a right perturbation of T_from_to
 };
@@ -49,25 +50,48 @@ struct RelativeEdge {
 /// A frame that was kept.
 struct Keyframe {
   HostTime t;
+  PartId part{};
   SE3 T_odom_cam;
   Matrix6d covariance = Matrix6d::Zero();   ///< of T_odom_cam
   std::shared_ptr<const DepthCloud> cloud;  ///< null where the frame had no depth or it was let go
-  std::shared_ptr<const PlaceView> place;   ///< null until describe() gives it
-  std::shared_ptr<const ImagePyramid> pyramid;  ///< null where it was let go
-  std::vector<PointId> points;                  ///< that it observes
+  std::shared_ptr<const StoredCloud> stored_cloud{};  ///< the same in a file; null: in none
+  std::shared_ptr<const PlaceView> place;             ///< null until describe() gives it
+  std::shared_ptr<const ImagePyramid> pyramid;        ///< null where it was let go
+  std::vector<PointId> points;                        ///< that it observes
+};
+
+/// All that a map is made of. Copies share what is heavy: a snapshot costs little.
+struct MapContents {
+  std::map<KeyframeId, Keyframe> keyframes;
+  std::map<PointId, MapPoint> points;
+  std::vector<RelativeEdge> edges;
+  /// What tied a part to another one, from the keyframe that is older: each is the one tie of two
+  /// threads of odometry, and as good as odometry.
+  std::vector<RelativeEdge> joins;
 };
 
 /// Keyframes, points and the edges between keyframes. Iterates in order of id, so that the same
 /// input gives the same map.
 class Map {
  public:
+  Map() = default;
+  /// A map that was kept; new keyframes begin a part of their own. Contents are consistent:
+  /// whatever is referred to is there.
+  explicit Map(MapContents contents);
+
+  /// Adds a keyframe to the newest part.
   KeyframeId add_keyframe(Keyframe keyframe);
+  /// Keyframes from now on belong to a part that nothing ties to the others.
+  void begin_part();
+  /// Ties two parts by a place seen in both: the one of `tie.to` gets the coordinates and the id of
+  /// that of `tie.from`. Returns T_odom1_odom0 of what was moved. The parts must differ.
+  SE3 join(const RelativeEdge& tie);
   /// Gives a keyframe that has none its place, and files it in places().
   void describe(KeyframeId id, std::shared_ptr<const PlaceView> place);
   PointId add_point(MapPoint point);
   /// Records that a keyframe sees a point (once per pair).
   void observe(PointId point, const Observation& observation);
-  void add_edge(const RelativeEdge& edge) { edges_.push_back(edge); }
+  void add_edge(const RelativeEdge& edge) { contents_.edges.push_back(edge); }
   /// Forgets all edges between two keyframes, in this direction.
   void remove_edges(KeyframeId from, KeyframeId to);
   /// Forgets a point and all its observations.
@@ -80,25 +104,43 @@ class Map {
   /// Lets go of the depth and the images of all but so many newest keyframes: what bounds the
   /// memory.
   void keep_newest(std::size_t clouds, std::size_t pyramids);
+  /// Reads the depth of keyframes within `radius_m` of a keyframe, in its part, that lies in a
+  /// file, nearest first and at most `most`. What cannot be read is not asked for again.
+  void read_clouds_near(KeyframeId id, double radius_m, std::size_t most);
 
+  [[nodiscard]] const MapContents& contents() const noexcept { return contents_; }
   [[nodiscard]] const std::map<KeyframeId, Keyframe>& keyframes() const noexcept {
-    return keyframes_;
+    return contents_.keyframes;
   }
-  [[nodiscard]] const std::map<PointId, MapPoint>& points() const noexcept { return points_; }
-  [[nodiscard]] const std::vector<RelativeEdge>& edges() const noexcept { return edges_; }
+  [[nodiscard]] const std::map<PointId, MapPoint>& points() const noexcept {
+    return contents_.points;
+  }
+  [[nodiscard]] const std::vector<RelativeEdge>& edges() const noexcept { return contents_.edges; }
+  [[nodiscard]] const std::vector<RelativeEdge>& joins() const noexcept { return contents_.joins; }
+  /// The part to which new keyframes belong.
+  [[nodiscard]] PartId newest_part() const noexcept { return newest_part_; }
+  /// Whether the newest part is the only one or has been joined to an older one.
+  [[nodiscard]] bool is_tied() const;
+  [[nodiscard]] bool same_part(KeyframeId a, KeyframeId b) const {
+    return keyframe(a).part == keyframe(b).part;
+  }
+  /// Whether no odometry leads to a keyframe from the one before, or there is none before.
+  [[nodiscard]] bool begins_thread(KeyframeId id) const {
+    return !contents_.keyframes.contains(KeyframeId{static_cast<std::uint32_t>(id) - 1});
+  }
   /// By what they look like: the keyframes that have their place.
   [[nodiscard]] const PlaceIndex& places() const noexcept { return places_; }
-  [[nodiscard]] Keyframe& keyframe(KeyframeId id) { return keyframes_.at(id); }
-  [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return keyframes_.at(id); }
+  [[nodiscard]] Keyframe& keyframe(KeyframeId id) { return contents_.keyframes.at(id); }
+  [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return contents_.keyframes.at(id); }
   /// Null where the point is no more.
   [[nodiscard]] MapPoint* find_point(PointId id);
   [[nodiscard]] const MapPoint* find_point(PointId id) const;
 
  private:
-  std::map<KeyframeId, Keyframe> keyframes_;
-  std::map<PointId, MapPoint> points_;
-  std::vector<RelativeEdge> edges_;
+  MapContents contents_;
   PlaceIndex places_;
+  PartId newest_part_{};
+  std::uint32_t next_part_ = 1;
   std::uint32_t next_keyframe_ = 0;
   std::uint32_t next_point_ = 0;
 };

@@ -250,6 +250,9 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
        it != map.keyframes().rend() &&
        moving.size() < static_cast<std::size_t>(config_.mapping.window);
        ++it) {
+    if (!map.same_part(it->first, newest)) {
+      continue;
+    }
     moving.insert(it->first);
     points.insert(it->second.points.begin(), it->second.points.end());
   }

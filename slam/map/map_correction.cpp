@@ -1,5 +1,6 @@
 #include "map/map_correction.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <iterator>
 #include <map>
@@ -46,18 +47,24 @@ bool moves_map(const Map& map, const RelativeEdge& loop) {
 
 PoseGraphProblem pose_graph(const Map& map) {
   PoseGraphProblem problem;
+  const auto inside = [&](KeyframeId id) { return map.keyframe(id).part == map.newest_part(); };
   for (auto it = map.keyframes().begin(); it != map.keyframes().end(); ++it) {
+    if (!inside(it->first)) {
+      continue;
+    }
     problem.nodes.push_back({it->first, it->second.T_odom_cam});
     const auto next = std::next(it);
-    if (next != map.keyframes().end()) {
+    if (next != map.keyframes().end() && !map.begins_thread(next->first)) {
       const SE3& T_odom_from = it->second.T_odom_cam;
       const SE3& T_odom_to = next->second.T_odom_cam;
       const SE3 T_from_to = T_odom_from.inverse() * T_odom_to;
       problem.way.push_back({it->first, next->first, T_from_to, information_of_step(T_from_to)});
     }
   }
+  std::ranges::copy_if(map.joins(), std::back_inserter(problem.way),
+                       [&](const RelativeEdge& join) { return inside(join.to); });
   for (const RelativeEdge& edge : map.edges()) {
-    if (ids_apart(edge.from, edge.to) > kLoop) {
+    if (inside(edge.to) && ids_apart(edge.from, edge.to) > kLoop) {
       problem.loops.push_back(edge);
     }
   }
@@ -77,9 +84,11 @@ std::optional<SE3> correct(Map& map, const PoseGraphSolution& solution) {
   std::map<KeyframeId, SE3> motion;
   for (const auto& [id, keyframe] : map.keyframes()) {
     const auto solved = solution.T_odom_cam.find(id);
-    motion.emplace(id, solved == solution.T_odom_cam.end()
-                           ? newest_motion
-                           : solved->second * keyframe.T_odom_cam.inverse());
+    if (solved != solution.T_odom_cam.end()) {
+      motion.emplace(id, solved->second * keyframe.T_odom_cam.inverse());
+    } else {
+      motion.emplace(id, id > newest ? newest_motion : SE3{});  // or it is of another part
+    }
   }
   map.move([&](KeyframeId id) { return motion.at(id); });
   return newest_motion;

@@ -14,8 +14,9 @@ namespace geoflow::slam {
 /// 95 %), so that closing it is worth while.
 [[nodiscard]] bool moves_map(const Map& map, const RelativeEdge& loop);
 
-/// All keyframes; between consecutive ones their present relative pose, as uncertain as odometry
-/// leaves it; and the edges between keyframes that are far apart in time.
+/// All keyframes of the newest part; between consecutive ones their present relative pose, as
+/// uncertain as odometry leaves it; what joined earlier parts to it; and the edges between
+/// keyframes that are far apart in time.
 [[nodiscard]] PoseGraphProblem pose_graph(const Map& map);
 
 /// Takes over a pose graph's solution: keyframes get their new poses, those made since move along

@@ -69,7 +69,7 @@ std::vector<OverlappingKeyframe> overlapping_keyframes(const Map& map, const Dep
   const std::vector<Eigen::Vector3f> samples = sample(cloud);
   std::vector<OverlappingKeyframe> found;
   for (const auto& [id, keyframe] : map.keyframes()) {
-    if (!keyframe.cloud) {
+    if (!keyframe.cloud || keyframe.part != map.newest_part()) {
       continue;
     }
     const double share =

@@ -24,8 +24,8 @@ struct OverlappingKeyframe {
   double overlap;  ///< share of the frame's depth that the keyframe sees at the same place, 0 to 1
 };
 
-/// Keyframes that see at least `least_overlap` of what `cloud` sees from `T_odom_cam`, most overlap
-/// first.
+/// Keyframes of the newest part that see at least `least_overlap` of what `cloud` sees from
+/// `T_odom_cam`, most overlap first.
 [[nodiscard]] std::vector<OverlappingKeyframe> overlapping_keyframes(const Map& map,
                                                                      const DepthCloud& cloud,
                                                                      const SE3& T_odom_cam,

@@ -93,7 +93,10 @@ class Verifier {
   [[nodiscard]] std::optional<LoopHypothesis> compare(const LoopView& old) const {
     // The old camera's frame stands where PnP and optimiser have odom.
     const auto start = solve_pnp(pairs(old), camera_, problem_.config.pose, kHypothesis);
-    const SE3 T_old_new = registered(old, start ? start->T_odom_cam : old.T_this_new);
+    if (!start && !old.T_this_new) {
+      return std::nullopt;
+    }
+    const SE3 T_old_new = registered(old, start ? start->T_odom_cam : *old.T_this_new);
     const std::vector<VisualMatch> matches = guided(old, T_old_new);
     std::vector<DepthTarget> targets;
     const bool depth = problem_.newest.cloud && old.cloud;
@@ -215,10 +218,14 @@ LoopView view_of(const Map& map, KeyframeId id, KeyframeId newest) {
   const Keyframe& keyframe = map.keyframe(id);
   const SE3& T_odom_this = keyframe.T_odom_cam;
   const SE3& T_odom_new = map.keyframe(newest).T_odom_cam;
-  return {.id = id,
-          .place = keyframe.place,
-          .cloud = keyframe.cloud,
-          .T_this_new = T_odom_this.inverse() * T_odom_new};
+  LoopView view{.id = id, .place = keyframe.place, .cloud = keyframe.cloud};
+  if (!view.cloud && keyframe.stored_cloud) {
+    view.cloud = keyframe.stored_cloud->read().value_or(nullptr);
+  }
+  if (map.same_part(id, newest)) {
+    view.T_this_new = T_odom_this.inverse() * T_odom_new;
+  }
+  return view;
 }
 
 /// Length of the way between two keyframes [m].
@@ -272,7 +279,11 @@ SE3 pose_by(const Map& map, const RelativeEdge& loop) {
   return T_odom_from * T_from_to;
 }
 
+/// Between parts anything is possible.
 bool is_possible(const Map& map, const RelativeEdge& loop) {
+  if (!map.same_part(loop.from, loop.to)) {
+    return true;
+  }
   const double way_m = way_between(map, loop.from, loop.to);
   const SE3& T_odom_new = map.keyframe(loop.to).T_odom_cam;
   const SE3 T_odom_new1 = pose_by(map, loop);
@@ -283,6 +294,9 @@ bool is_possible(const Map& map, const RelativeEdge& loop) {
 
 /// Whether two loops put the later's new keyframe at one place, by the way between them.
 bool say_the_same(const Map& map, const RelativeEdge& a, const RelativeEdge& b) {
+  if (!map.same_part(a.from, b.from) || !map.same_part(a.to, b.to)) {
+    return false;
+  }
   const SE3& T_odom_newa = map.keyframe(a.to).T_odom_cam;
   const SE3& T_odom_newb = map.keyframe(b.to).T_odom_cam;
   const SE3 T_odom_newb1 = pose_by(map, a) * (T_odom_newa.inverse() * T_odom_newb);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
@@ -21,7 +22,8 @@ struct LoopView {
   KeyframeId id{};
   std::shared_ptr<const PlaceView> place;
   std::shared_ptr<const DepthCloud> cloud;  ///< null: none, or let go
-  SE3 T_this_new;                           ///< where odometry has the new one, seen from it
+  /// Where odometry has the new one, seen from it; none where they are of different parts.
+  std::optional<SE3> T_this_new{};
 };
 
 /// A keyframe and old ones that look like it or should see the same.

@@ -255,11 +255,14 @@ std::vector<KeyframeId> Relocaliser::candidates(const Map& map, const Frame& fra
   std::vector<KeyframeId> chosen;
   for (auto it = map.keyframes().rbegin();
        it != map.keyframes().rend() && chosen.size() < kNewestByFeatures; ++it) {
-    if (it->second.place) {
+    if (it->second.place && it->second.part == map.newest_part()) {
       chosen.push_back(it->first);
     }
   }
-  const auto ranking = map.places().query(*frame.place, map.places().size());
+  auto ranking = map.places().query(*frame.place, map.places().size());
+  std::erase_if(ranking, [&](const PlaceCandidate& candidate) {
+    return map.keyframe(candidate.keyframe).part != map.newest_part();
+  });
   for (const PlaceCandidate& candidate : peaks(ranking, kAlikeByFeatures, kStretch)) {
     if (std::ranges::find(chosen, candidate.keyframe) == chosen.end()) {
       chosen.push_back(candidate.keyframe);
@@ -288,7 +291,7 @@ std::optional<Relocation> Relocaliser::find(const Map& map, const Frame& frame,
   std::size_t tried = 0;
   for (auto it = map.keyframes().rbegin();
        !best && it != map.keyframes().rend() && tried < kNewestByDepth; ++it, ++tried) {
-    if (it->second.place) {
+    if (it->second.place && it->second.part == map.newest_part()) {
       better(by_depth(map, frame, it->first, T_odom_cam_guess));
     }
   }

@@ -34,9 +34,10 @@ class Relocaliser {
   Relocaliser(const Config& config, const GicpConfig& gicp, const CameraModel& camera)
       : config_{config}, gicp_{gicp}, camera_{camera}, flow_{config.flow, camera_} {}
 
-  /// Looks for hypotheses in the newest few keyframes and, of all, those that look most like the
-  /// frame: pairs of descriptors give one by P3P with RANSAC on the keyframe's depth; where none
-  /// does, registration of depth to the newest from `T_odom_cam_guess` and around it does. A
+  /// Looks in the newest part of the map.
+  /// Hypotheses are looked for in the newest few keyframes and, of all, those that look most like
+  /// the frame: pairs of descriptors give one by P3P with RANSAC on the keyframe's depth; where
+  /// none does, registration of depth to the newest from `T_odom_cam_guess` and around it does. A
   /// hypothesis is believed when the keyframe's map points, projected with it, are found by optical
   /// flow from the keyframe's image and agree on one pose, or the two views' depth lies on one
   /// surface nearly everywhere and leaves no direction open. Where the keyframe's image was let go,

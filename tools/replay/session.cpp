@@ -1,6 +1,7 @@
 #include "replay/session.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <utility>
 
@@ -41,6 +42,9 @@ Result<ReplayResult> replay(const daemon::Config& config, const ReplayProgress& 
   }
   ReplayResult result;
   result.run = std::move(*opened);
+  if (const std::optional<Error>& refused = result.run.map_refused) {
+    return tl::unexpected{*refused};
+  }
   std::stop_source stop;
   std::uint64_t frames = 0;
   const std::uint64_t total = color_images(result.run.streams->info());

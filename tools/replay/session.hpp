@@ -28,7 +28,8 @@ struct ReplayResult {
 /// interrupts.
 using ReplayProgress = std::function<bool(std::uint64_t frames, std::uint64_t total)>;
 
-/// Replays the configured recording in lock step. Thread-bound.
+/// Replays the configured recording in lock step, with the configured map; one that is refused is
+/// an error. Thread-bound.
 [[nodiscard]] Result<ReplayResult> replay(const daemon::Config& config,
                                           const ReplayProgress& progress);
 

@@ -18,6 +18,8 @@
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/slam/core.hpp"
+#include "geoflow/slam/saved_map.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
 
@@ -43,6 +45,7 @@ class ReplayVerb final : public Verb {
            "ones each time\n"
            "  geoflow replay bag -o out --set slam.switches.gicp=false    without one of the "
            "estimator's parts\n"
+           "  geoflow replay bag -o out --load-map a.map --save-map b.map in a map, kept\n"
            "The keys of report.json: docs/cli.md. Those of --set: config/geoflow.toml.";
   }
 
@@ -57,6 +60,8 @@ class ReplayVerb final : public Verb {
     command.add_option("--config", config_file_, "TOML file");
     command.add_option("--faults", faults_, "Script of faults to put on the recording");
     command.add_option("--seed", seed_, "Seed of the script's random choices");
+    command.add_option("--load-map", load_map_, "Begin with this map, and find the place in it");
+    command.add_option("--save-map", save_map_, "Write the map to this file at the end");
     command
         .add_option("--set", settings_,
                     "Overrides one key of the configuration, section.key=value; repeatable")
@@ -102,6 +107,7 @@ class ReplayVerb final : public Verb {
                         .faults = faults_,
                         .fault_seed = seed_,
                         .realtime = false};
+      config->map.file = load_map_;
     }
     return config;
   }
@@ -110,6 +116,9 @@ class ReplayVerb final : public Verb {
                                         Console& console) const {
     const nlohmann::json report = make_report(result, config);
     auto written = write_outputs(output_, result, report);
+    if (written && !save_map_.empty()) {
+      written = slam::save_map(*result.run.core->snapshot(), save_map_);
+    }
     if (!written) {
       return tl::unexpected{std::move(written.error())};
     }
@@ -136,6 +145,8 @@ class ReplayVerb final : public Verb {
   std::string calibration_;
   std::string config_file_;
   std::string faults_;
+  std::string load_map_;
+  std::string save_map_;
   std::uint64_t seed_ = 0;
   std::vector<std::string> settings_;
 };

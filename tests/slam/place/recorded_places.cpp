@@ -1,6 +1,7 @@
 #include "recorded_places.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -93,6 +94,20 @@ Frame RecordedPlaces::look(const FrameRef& color, const FrameRef& depth) {
   frame.place =
       describe_place(frame.pyramid->image(), frame.depth, frame.cloud.get(), camera(), orb_);
   return frame;
+}
+
+SyncedPacket RecordedPlaces::packet(std::size_t i, const FrameRef& color, const FrameRef& depth) {
+  constexpr auto kPeriod = std::chrono::nanoseconds{std::chrono::seconds{1}} / 30;
+  SyncedPacket packet;
+  packet.t = HostTime{kPeriod * static_cast<std::int64_t>(i + 1)};
+  packet.sequence = i;
+  packet.color = color;
+  packet.depth = depth;
+  return packet;
+}
+
+SyncedPacket RecordedPlaces::packet_mirrored(std::size_t i) const {
+  return packet(i, mirrored<std::uint8_t>(color_[i]), mirrored<std::uint16_t>(depth_[i]));
 }
 
 Frame RecordedPlaces::look_mirrored(std::size_t i) {

@@ -36,6 +36,10 @@ class RecordedPlaces {
   /// True pose of the camera, in the reference's world.
   [[nodiscard]] const SE3& reference(std::size_t i) const { return reference_[i].pose; }
 
+  /// What a synchroniser would make of the images, 30 of them a second.
+  [[nodiscard]] SyncedPacket packet(std::size_t i) const { return packet(i, color_[i], depth_[i]); }
+  [[nodiscard]] SyncedPacket packet_mirrored(std::size_t i) const;
+
   /// A frame with pyramid, cloud and place, at the identity.
   [[nodiscard]] Frame look(std::size_t i) { return look(color_[i], depth_[i]); }
   [[nodiscard]] Frame look_mirrored(std::size_t i);
@@ -44,6 +48,8 @@ class RecordedPlaces {
   [[nodiscard]] const GicpConfig& gicp() const noexcept { return gicp_; }
 
  private:
+  [[nodiscard]] static SyncedPacket packet(std::size_t i, const FrameRef& color,
+                                           const FrameRef& depth);
   [[nodiscard]] Frame look(const FrameRef& color, const FrameRef& depth);
 
   Config config_;

@@ -46,6 +46,11 @@ struct PipelineConfig {
   int image_queue = 8;      ///< images of each kind that may wait for the synchroniser; likewise
   int sample_queue = 1024;  ///< IMU samples, and leg samples, that may wait for the synchroniser
 };
+
+/// The map that outlives the daemon.
+struct MapConfig {
+  std::filesystem::path file;  ///< empty: none
+};
 // NOLINTEND(readability-magic-numbers)
 
 struct Config {
@@ -55,6 +60,7 @@ struct Config {
   slam::Config slam;
   SocketConfig socket;
   PipelineConfig pipeline;
+  MapConfig map;
 };
 
 /// Defaults overlaid by a TOML file. Errors: kNotFound, kSystem for the file; kInvalidArgument,

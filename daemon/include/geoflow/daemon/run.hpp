@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
@@ -23,10 +24,13 @@ struct Run {
   std::unique_ptr<drivers::RecordedStreams> streams;
   std::unique_ptr<RunStatistics> statistics;
   std::unique_ptr<slam::Core> core;
+  /// Why the configured map was not taken; none where it was, or none is configured.
+  std::optional<Error> map_refused{};
   timesync::SynchroniserCounters synchroniser;  ///< filled when the run is over
 };
 
-/// Opens the configured source and makes an estimator for its calibration; from then on the process
+/// Opens the configured source and makes an estimator for its calibration, which begins with the
+/// configured map if that can be read and was made with this calibration; from then on the process
 /// keeps the memory it frees. Errors name file, line or key.
 [[nodiscard]] Result<Run> open_run(const Config& config);
 

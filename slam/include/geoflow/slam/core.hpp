@@ -10,6 +10,7 @@
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/slam/config.hpp"
 #include "geoflow/slam/mapping.hpp"
+#include "geoflow/slam/saved_map.hpp"
 #include "geoflow/slam/stage.hpp"
 
 namespace geoflow::slam {
@@ -34,9 +35,13 @@ class Core {
  public:
   /// Errors: kInvalidArgument for a calibration without image size or focal length, or a
   /// configuration value out of range. `observer` may be null; it must outlive the Core.
+  /// With a `saved` map (null: none) made with this calibration (made_with()), the Core looks for
+  /// its place there: until it finds it, estimates are of a part of its own, with status
+  /// kRelocalising.
   [[nodiscard]] static Result<std::unique_ptr<Core>> create(const Calibration& calibration,
                                                             const Config& config,
-                                                            StageObserver* observer = nullptr);
+                                                            StageObserver* observer = nullptr,
+                                                            const StoredMap* saved = nullptr);
   /// For create(): nobody else has an Impl.
   explicit Core(std::unique_ptr<Impl> impl);
   Core(const Core&) = delete;
@@ -62,6 +67,10 @@ class Core {
 
   /// T_odom_base of every frame that was tracked, after all optimisation so far, in order of time.
   [[nodiscard]] Trajectory final_trajectory() const;
+
+  /// The map as it is now, with the saved one that it began with. Shares what is heavy, so that it
+  /// may be written in another thread.
+  [[nodiscard]] std::shared_ptr<const StoredMap> snapshot() const;
 
  private:
   std::unique_ptr<Impl> impl_;
