@@ -44,7 +44,7 @@ LIBRARIES = (
     Library("Boost", r"boost/", ("Boost::headers",), ("timesync",)),
     Library("SQLite", r"sqlite3\.h", ("PkgConfig::SQLITE3", "SQLite::SQLite3"), ("drivers/replay",)),
     Library("zstd", r"zstd\.h", ("PkgConfig::ZSTD",), ("drivers/replay",)),
-    Library("zlib", r"zlib\.h", ("ZLIB::ZLIB",), ("drivers/replay/scannet", "slam/storage")),
+    Library("zlib", r"z(lib|conf)\.h", ("ZLIB::ZLIB",), ("drivers/replay/scannet", "slam/storage")),
     Library("yaml-cpp", r"yaml-cpp/", ("yaml-cpp",), ("drivers/replay",)),
     Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay")),
     Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/src/command_line.cpp", "tools")),
