@@ -9,6 +9,7 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 
+#include "can/log_reader.hpp"
 #include "replay/bag/reader.hpp"
 #include "replay/euroc/reader.hpp"
 #include "replay/openloris/reader.hpp"
@@ -44,6 +45,12 @@ constexpr std::array kFormats = {
     Format{.description = "ScanNet (a .sens file)",
            .looks_like = scannet::looks_like,
            .open = [](const RecordingOptions& options) { return scannet::open(options.path); }},
+    Format{.description = "CAN log (a file as candump -L writes it)",
+           .looks_like = can::looks_like_log,
+           .open =
+               [](const RecordingOptions& options) {
+                 return can::open_log(options.path, options.can_dictionary);
+               }},
     Format{.description =
                "EuRoC IMU (a .csv file, or mav0/imu0/data.csv, imu0/data.csv, imu.csv, data.csv)",
            .looks_like = [](const Path& path) { return euroc::find_csv(path).has_value(); },

@@ -80,6 +80,8 @@ THREAD_HEADERS = {"thread", "mutex", "condition_variable", "shared_mutex", "sema
 # The only files outside tests that make a thread or take a lock, each for the reason given.
 THREAD_FILES = (
     "hal/src/log.cpp",  # the sink is called under a lock
+    "drivers/can/legs_source.cpp",  # reads the legs' bus on a thread of its own
+    "drivers/can/legs_source.hpp",
     "drivers/replay/bag/writer.cpp",  # samples are written from the threads that bring them
     "drivers/replay/port.hpp",  # a port's sink is started and stopped while the recording plays
     "drivers/replay/prefetcher.cpp",  # decodes images ahead of the replay

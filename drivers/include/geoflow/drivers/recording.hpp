@@ -35,6 +35,8 @@ struct RecordingOptions {
   /// says.
   std::optional<std::filesystem::path> calibration{};
   TopicNames topics{};
+  /// What the frames of a CAN log mean; none: the .dbc file beside it, then config/go2_legs.dbc.
+  std::optional<std::filesystem::path> can_dictionary{};
   std::optional<std::filesystem::path> faults{};  ///< a fault script (docs/fault-scripts.md)
   std::uint64_t fault_seed = 0;
   /// Colour images are decoded to kGray8 (cheaper for JPEG, and what the estimator wants); else to
@@ -53,7 +55,7 @@ struct StreamSummary {
 };
 
 struct RecordingInfo {
-  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `scannet`, `euroc`
+  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `scannet`, `candump`, `euroc`
   HostTime start;      ///< stamp of the first sample, on the recording's time line
   HostTime end;        ///< stamp of the last sample
   std::vector<StreamSummary> streams;
