@@ -36,7 +36,9 @@ class ScriptedDevice final : public UsbDevice {
     script.pop_front();
     return next;
   }
-  [[nodiscard]] HostTime next_due(HostTime /*now*/) override { return HostTime::max(); }
+  [[nodiscard]] HostTime next_due(std::uint8_t /*endpoint*/, HostTime /*now*/) override {
+    return HostTime::max();
+  }
   [[nodiscard]] bool connected(HostTime /*now*/) override { return true; }
   void reset(HostTime /*now*/) override { script.clear(); }
 };

@@ -48,6 +48,7 @@ class ByteWriter {
     return *this;
   }
 
+  void reserve(std::size_t size) { bytes_.reserve(size); }
   [[nodiscard]] std::size_t size() const noexcept { return bytes_.size(); }
   [[nodiscard]] const Bytes& view() const noexcept { return bytes_; }
   /// Gives the bytes away; empty afterwards.

@@ -67,9 +67,10 @@ class UsbDevice {
   /// Takes the next transfer of an IN endpoint (address with its direction bit, 0x82).
   [[nodiscard]] virtual InTransfer next_in(std::uint8_t endpoint, HostTime now) = 0;
 
-  /// When next_in() may first have more to say than it had at `now`; HostTime::max() where only a
-  /// control transfer can bring that about.
-  [[nodiscard]] virtual HostTime next_due(HostTime now) = 0;
+  /// When next_in() of that endpoint may first have more to say than it had at `now`;
+  /// HostTime::max() where only a control transfer can bring that about. While the device is off
+  /// the bus: when it comes back.
+  [[nodiscard]] virtual HostTime next_due(std::uint8_t endpoint, HostTime now) = 0;
 
   /// False while the device is off the bus (unplugged, or restarting). It comes back with all state
   /// lost.

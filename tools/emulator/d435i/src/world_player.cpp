@@ -1,0 +1,48 @@
+#include "src/world_player.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/emulator/world.hpp"
+
+namespace geoflow::emulator {
+
+void WorldPlayer::run(bool running, HostTime now) noexcept {
+  if (running && !running_) {
+    start_ = now - paused_at_;
+  } else if (!running && running_) {
+    paused_at_ = now - start_;
+  }
+  running_ = running;
+}
+
+void WorldPlayer::look_ahead() {
+  while (!ahead_ && !ended_) {
+    auto sample = world_->next();
+    if (!sample) {
+      ++errors_;
+    } else if (*sample) {
+      ahead_ = std::move(**sample);
+    } else {
+      ended_ = true;
+    }
+  }
+}
+
+std::optional<WorldSample> WorldPlayer::next(HostTime now) {
+  if (next_due() > now) {
+    return std::nullopt;
+  }
+  return std::exchange(ahead_, std::nullopt);
+}
+
+HostTime WorldPlayer::next_due() {
+  if (!running_) {
+    return HostTime::max();
+  }
+  look_ahead();
+  return ahead_ ? host_time(ahead_->t_sent) : HostTime::max();
+}
+
+}  // namespace geoflow::emulator
