@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/nearest_name.hpp"
 #include "geoflow/slam/config.hpp"
@@ -24,6 +25,7 @@ void bind_source(SourceConfig& c, std::vector<Key>& keys) {
   keys.push_back({"source.fault_seed", &c.fault_seed, 0, kLargestSeed});
   keys.push_back({"source.realtime", &c.realtime});
   keys.push_back({"source.loop", &c.loop});
+  keys.push_back({"source.legs", &c.legs});
 }
 
 void bind_topics(drivers::TopicNames& c, std::vector<Key>& keys) {
@@ -34,6 +36,12 @@ void bind_topics(drivers::TopicNames& c, std::vector<Key>& keys) {
   keys.push_back({"topics.legs", &c.legs});
   keys.push_back({"topics.odometry", &c.odometry});
   keys.push_back({"topics.base_frame", &c.base_frame});
+}
+
+void bind_can(drivers::CanLegsOptions& c, std::vector<Key>& keys) {
+  keys.push_back({"can.interfaces", &c.interfaces});
+  keys.push_back({"can.dictionary", &c.dictionary});
+  keys.push_back({"can.log", &c.log});
 }
 
 void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) {
@@ -142,6 +150,7 @@ std::vector<Key> bind_keys(Config& config) {
   std::vector<Key> keys;
   bind_source(config.source, keys);
   bind_topics(config.topics, keys);
+  bind_can(config.can, keys);
   bind_synchroniser(config.synchroniser, keys);
   bind_slam(config.slam, keys);
   bind_socket(config.socket, keys);

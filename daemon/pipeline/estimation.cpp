@@ -4,7 +4,6 @@
 #include <cstddef>
 
 #include "geoflow/daemon/run.hpp"
-#include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
@@ -22,15 +21,16 @@ PoseEstimate process_packet(Run& run, const SyncedPacket& packet) {
   return estimate;
 }
 
-timesync::SynchroniserStreams synchroniser_streams(drivers::RecordedStreams& streams) {
+timesync::SynchroniserStreams synchroniser_streams(Run& run) {
+  const Ports ports = run.ports();
   timesync::SynchroniserStreams described{
-      .camera = streams.camera().stamps(),
-      .timeshift_cam_imu = streams.calibration().timeshift_cam_imu};
-  if (streams.imu() != nullptr) {
-    described.imu = streams.imu()->stamps();
+      .camera = ports.camera.stamps(),
+      .timeshift_cam_imu = run.streams->calibration().timeshift_cam_imu};
+  if (ports.imu != nullptr) {
+    described.imu = ports.imu->stamps();
   }
-  if (streams.legs() != nullptr) {
-    described.legs = streams.legs()->stamps();
+  if (ports.legs != nullptr) {
+    described.legs = ports.legs->stamps();
   }
   return described;
 }

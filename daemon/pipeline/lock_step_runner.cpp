@@ -58,9 +58,9 @@ LockStepRunner::LockStepRunner(Run& run, const Config& config, EstimateHandler h
     : run_{run}, config_{config}, handler_{std::move(handler)} {}
 
 Result<void> LockStepRunner::run(const std::stop_token& stop) {
-  timesync::Synchroniser synchroniser{config_.synchroniser, synchroniser_streams(*run_.streams)};
+  timesync::Synchroniser synchroniser{config_.synchroniser, synchroniser_streams(run_)};
   DirectReceiver receiver{synchroniser, run_.statistics->counters};
-  StartedPorts ports{*run_.streams};
+  StartedPorts ports{run_.ports()};
   auto started = ports.start(receiver);
   if (!started) {
     return started;

@@ -67,9 +67,9 @@ class Pipeline::Implementation {
         on_end_{std::move(on_end)},
         bells_{std::move(bells)},
         queues_{config.pipeline, run.statistics->counters, bells_.sync},
-        synchroniser_{config.synchroniser, synchroniser_streams(*run.streams)},
+        synchroniser_{config.synchroniser, synchroniser_streams(run)},
         packets_{static_cast<std::size_t>(config.pipeline.packet_queue)},
-        ports_{*run.streams} {}
+        ports_{run.ports()} {}
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
   ~Implementation() { stop(); }

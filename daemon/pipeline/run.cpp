@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <malloc.h>
@@ -10,8 +11,10 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/saved_map.hpp"
@@ -27,9 +30,27 @@ drivers::RecordingOptions recording_options(const Config& config) {
   return {.path = config.source.replay,
           .calibration = if_given(config.source.calibration),
           .topics = config.topics,
+          .can_dictionary = if_given(config.can.dictionary),
           .faults = if_given(config.source.faults),
           .fault_seed = config.source.fault_seed,
           .color_as_gray = true};
+}
+
+/// The device that source.legs names; null where it names none.
+Result<std::unique_ptr<Legs>> open_legs(const Config& config) {
+  const std::string& device = config.source.legs;
+  if (device.empty()) {
+    return nullptr;
+  }
+  if (device != "can") {
+    return fail(ErrorCode::kInvalidArgument, "source.legs: '{}' is no device; there is: can",
+                device);
+  }
+  if (!config.source.realtime) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.legs: a device keeps its own pace, so source.realtime must be true");
+  }
+  return drivers::open_can_legs(config.can);
 }
 
 /// Every frame allocates and frees the same image-sized blocks. By default glibc gives such blocks
@@ -58,6 +79,12 @@ Result<std::shared_ptr<const slam::StoredMap>> saved_map(const MapConfig& config
 
 }  // namespace
 
+Ports Run::ports() {
+  return {.camera = streams->camera(),
+          .imu = streams->imu(),
+          .legs = legs ? legs.get() : streams->legs()};
+}
+
 Result<Run> open_run(const Config& config) {
   if (config.source.replay.empty()) {
     return fail(ErrorCode::kInvalidArgument, "source.replay: no recording is named (--replay DIR)");
@@ -69,6 +96,11 @@ Result<Run> open_run(const Config& config) {
     return tl::unexpected{std::move(streams.error())};
   }
   run.streams = std::move(*streams);
+  auto legs = open_legs(config);
+  if (!legs) {
+    return tl::unexpected{std::move(legs.error())};
+  }
+  run.legs = std::move(*legs);
   run.statistics = std::make_unique<RunStatistics>();
   auto map = saved_map(config.map, run.streams->calibration());
   if (!map) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "geoflow/drivers/recording.hpp"
+#include "geoflow/daemon/run.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 
@@ -10,7 +10,7 @@ namespace geoflow::daemon {
 /// Thread-bound.
 class StartedPorts {
  public:
-  explicit StartedPorts(drivers::RecordedStreams& streams) : streams_{streams} {}
+  explicit StartedPorts(const Ports& ports) : ports_{ports} {}
   StartedPorts(const StartedPorts&) = delete;
   StartedPorts& operator=(const StartedPorts&) = delete;
   ~StartedPorts() { stop(); }
@@ -19,28 +19,28 @@ class StartedPorts {
   /// outlive stop().
   template <typename Receiver>
   [[nodiscard]] Result<void> start(Receiver& receiver) {
-    auto started = streams_.camera().start(receiver);
-    if (started && streams_.imu() != nullptr) {
-      started = streams_.imu()->start(receiver);
+    auto started = ports_.camera.start(receiver);
+    if (started && ports_.imu != nullptr) {
+      started = ports_.imu->start(receiver);
     }
-    if (started && streams_.legs() != nullptr) {
-      started = streams_.legs()->start(receiver);
+    if (started && ports_.legs != nullptr) {
+      started = ports_.legs->start(receiver);
     }
     return started;
   }
 
   void stop() {
-    streams_.camera().stop();
-    if (streams_.imu() != nullptr) {
-      streams_.imu()->stop();
+    ports_.camera.stop();
+    if (ports_.imu != nullptr) {
+      ports_.imu->stop();
     }
-    if (streams_.legs() != nullptr) {
-      streams_.legs()->stop();
+    if (ports_.legs != nullptr) {
+      ports_.legs->stop();
     }
   }
 
  private:
-  drivers::RecordedStreams& streams_;
+  Ports ports_;
 };
 
 /// A receiver of all three ports.

@@ -21,6 +21,7 @@
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/hal/log.hpp"
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -30,6 +31,31 @@
 #include "geoflow/timesync/doorbell.hpp"
 
 namespace geoflow::daemon {
+namespace {
+
+const char* name_of(SourceState state) {
+  switch (state) {
+    case SourceState::kStopped:
+      return "stopped";
+    case SourceState::kStreaming:
+      return "streaming";
+    case SourceState::kDegraded:
+      return "degraded";
+    case SourceState::kFailed:
+      return "failed";
+  }
+  return "unknown";
+}
+
+nlohmann::json to_json(const SourceHealth& health) {
+  return {{"state", name_of(health.state)},
+          {"reason", health.reason},
+          {"delivered", health.delivered},
+          {"rejected", health.rejected},
+          {"dropped", health.dropped}};
+}
+
+}  // namespace
 
 Worker::Worker(const Config& config, timesync::Doorbell& bell, std::uint32_t earlier_resets,
                Run run)
@@ -126,6 +152,9 @@ nlohmann::json Worker::status() const {
                       {"format", run_.streams->info().format},
                       {"calibration", run_.streams->calibration().source},
                       {"realtime", config_.source.realtime}};
+  if (run_.legs) {
+    status["health"] = {{"legs", to_json(run_.legs->health())}};
+  }
   return status;
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -25,6 +26,7 @@ struct SourceConfig {
   std::uint64_t fault_seed = 0;
   bool realtime = true;  ///< at the pace it was recorded; else as fast as it can be worked on
   bool loop = false;     ///< begin again at its end
+  std::string legs{};    ///< `can`: legs come from there instead; empty: from the recording
 };
 
 // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
@@ -56,6 +58,7 @@ struct MapConfig {
 struct Config {
   SourceConfig source;
   drivers::TopicNames topics;
+  drivers::CanLegsOptions can;
   timesync::SynchroniserConfig synchroniser;
   slam::Config slam;
   SocketConfig socket;

@@ -7,6 +7,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -18,15 +19,26 @@ namespace geoflow::daemon {
 /// Gets every estimate with its packet, on the thread that estimates. Must not block.
 using EstimateHandler = std::function<void(const SyncedPacket&, const PoseEstimate&)>;
 
+/// Where a run's samples come from.
+struct Ports {
+  DepthCamera& camera;
+  Imu* imu = nullptr;    ///< null: there is none
+  Legs* legs = nullptr;  ///< likewise
+};
+
 /// One source with one estimator and what is measured of them: what LockStepRunner and Pipeline
 /// work on.
 struct Run {
   std::unique_ptr<drivers::RecordedStreams> streams;
+  std::unique_ptr<Legs> legs{};  ///< a device's, in the place of the recording's; null: none
   std::unique_ptr<RunStatistics> statistics;
   std::unique_ptr<slam::Core> core;
   /// Why the configured map was not taken; none where it was, or none is configured.
   std::optional<Error> map_refused{};
   timesync::SynchroniserCounters synchroniser;  ///< filled when the run is over
+
+  /// The recording's ports, but for those that a device stands in for.
+  [[nodiscard]] Ports ports();
 };
 
 /// Opens the configured source and makes an estimator for its calibration, which begins with the
