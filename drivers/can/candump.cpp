@@ -12,7 +12,8 @@
 #include <string_view>
 #include <system_error>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <tl/expected.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -34,9 +35,10 @@ constexpr std::array kFdLengths = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32
 
 std::optional<std::uint32_t> parse_hex(std::string_view digits) {
   std::uint32_t value = 0;
-  const char* const last = digits.data() + digits.size();
-  const auto [end, failed] = std::from_chars(digits.data(), last, value, kHexadecimal);
-  return failed == std::errc{} && end == last ? std::optional{value} : std::nullopt;
+  const auto [end, failed] =
+      std::from_chars(digits.data(), digits.data() + digits.size(), value, kHexadecimal);
+  return failed == std::errc{} && end == digits.data() + digits.size() ? std::optional{value}
+                                                                       : std::nullopt;
 }
 
 Result<void> parse_identifier(std::string_view digits, Frame& frame) {

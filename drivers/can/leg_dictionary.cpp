@@ -201,16 +201,18 @@ Result<void> LegDictionary::add_sync(const dbc::Message& message) {
   return {};
 }
 
+bool LegDictionary::has(Quantity quantity, std::size_t joint) const {
+  return std::ranges::any_of(groups_, [&](const FieldGroup& group) {
+    return std::ranges::any_of(group.fields, [&](const LegField& field) {
+      return field.quantity == quantity && field.index == joint;
+    });
+  });
+}
+
 Result<void> LegDictionary::check_complete() const {
   for (const JointQuantity& kind : kJointQuantities) {
-    for (std::size_t joint = 0; kind.quantity != Quantity::kTorque && joint < kJointCount;
-         ++joint) {
-      const bool there = std::ranges::any_of(groups_, [&](const FieldGroup& group) {
-        return std::ranges::any_of(group.fields, [&](const LegField& field) {
-          return field.quantity == kind.quantity && field.index == joint;
-        });
-      });
-      if (!there) {
+    for (std::size_t joint = 0; joint < kJointCount; ++joint) {
+      if (kind.quantity != Quantity::kTorque && !has(kind.quantity, joint)) {
         return fail(ErrorCode::kInvalidData, "{}: no message has a signal {}_{}_{}", name_,
                     kLegNames[joint / kJointsPerLeg], kJointNames[joint % kJointsPerLeg],
                     kind.suffix);

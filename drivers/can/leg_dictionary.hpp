@@ -112,6 +112,7 @@ class LegDictionary {
  private:
   [[nodiscard]] Result<void> add(const dbc::Message& message);
   [[nodiscard]] Result<void> add_sync(const dbc::Message& message);
+  [[nodiscard]] bool has(Quantity quantity, std::size_t joint) const;
   [[nodiscard]] Result<void> check_complete() const;
   void index();
 

@@ -70,8 +70,8 @@ std::vector<Frame> LegEncoder::encode(const LegSample& sample, std::uint64_t rou
     }
   }
   std::ranges::stable_sort(frames, {}, &Frame::id);
-  if (dictionary_.sync()) {
-    frames.insert(frames.begin(), sync_frame(*dictionary_.sync(), round, device_time));
+  if (const auto& sync = dictionary_.sync()) {
+    frames.insert(frames.begin(), sync_frame(*sync, round, device_time));
   }
   return frames;
 }

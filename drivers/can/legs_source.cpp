@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
+#include <cstddef>
 #include <fstream>
 #include <memory>
 #include <mutex>
@@ -18,7 +18,6 @@
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
-#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "can/candump.hpp"
@@ -26,6 +25,7 @@
 #include "can/frame.hpp"
 #include "can/leg_dictionary.hpp"
 #include "can/link_monitor.hpp"
+#include "can/snapshot.hpp"
 
 namespace geoflow::drivers::can {
 namespace {

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <string>
 #include <system_error>
 #include <utility>
 
@@ -19,11 +18,11 @@
 #include "geoflow/hal/time.hpp"
 
 #include "can/candump.hpp"
-#include "can/frame.hpp"
 #include "can/leg_dictionary.hpp"
 #include "can/snapshot.hpp"
 #include "replay/line_file.hpp"
 #include "replay/reader.hpp"
+#include "replay/text.hpp"
 
 namespace geoflow::drivers::can {
 namespace {

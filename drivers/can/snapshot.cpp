@@ -102,10 +102,11 @@ std::int64_t SnapshotAssembler::unwrapped(std::uint64_t counter, std::size_t bit
 }
 
 bool SnapshotAssembler::take_sync(const Received& received) {
-  const SyncMessage& sync = *dictionary_.sync();
-  if (!counted_) {
+  const auto& found = dictionary_.sync();
+  if (!counted_ || !found) {
     return true;
   }
+  const SyncMessage& sync = *found;
   const auto payload = received.frame.payload();
   const std::uint64_t counter = sync.sequence.raw(payload);
   std::int64_t number = unwrapped(counter, sync.sequence.field.bits);
@@ -247,9 +248,11 @@ bool SnapshotAssembler::is_complete(const Round& round, HostTime now) const {
 
 std::optional<Arrival<LegClock, LegSample>> SnapshotAssembler::pop(HostTime now) {
   // A later round that is whole ends the wait for those before it: nodes send in order.
-  const auto whole = std::find_if(open_.rbegin(), open_.rend(),
-                                  [&](const Round& round) { return is_complete(round, now); });
-  for (auto left = std::distance(whole, open_.rend()); left > 0; --left) {
+  std::size_t over = 0;
+  for (std::size_t i = 0; i < open_.size(); ++i) {
+    over = is_complete(open_[i], now) ? i + 1 : over;
+  }
+  for (; over > 0; --over) {
     close_front();
   }
   while (!open_.empty() && now - open_.front().t_first >= config_.most_wait) {
@@ -303,10 +306,11 @@ std::optional<Duration> SnapshotAssembler::device_time_of(const Round& round) co
   if (stamps().domain == StampDomain::kHost) {
     return round.t_sync.value_or(round.t_first).time_since_epoch();
   }
-  if (round.device_time || !placed_ || round_period_ <= Duration::zero()) {
+  const auto& sync = dictionary_.sync();
+  if (round.device_time || !placed_ || !sync || round_period_ <= Duration::zero()) {
     return round.device_time;
   }
-  const Duration period = dictionary_.sync()->period;
+  const Duration period = sync->period;
   const Duration time =
       (placed_->device_time + (round.number - placed_->number) * round_period_) % period;
   return time < Duration::zero() ? time + period : time;

@@ -10,8 +10,8 @@
 
 namespace geoflow::drivers {
 
-/// One port of a recording: whoever steps the recording delivers through it. Thread-safe, but
-/// start, stop and health must not be called from inside the sink.
+/// One port of a recording, or of a device that has several: whoever steps it delivers through it.
+/// Thread-safe, but start, stop and health must not be called from inside the sink.
 template <typename Sink>
 class Port final : public Source<Sink> {
  public:
@@ -50,7 +50,18 @@ class Port final : public Source<Sink> {
     }
     use(*sink_);
     ++health_.delivered;
-    set_state(SourceState::kStreaming, {});
+    if (reported_ == SourceState::kStreaming) {
+      set_state(SourceState::kStreaming, {});
+    }
+  }
+
+  /// How the source is, for the port of a device: it stands until the next report. `rejected` is
+  /// how many samples could not be used so far.
+  void report(SourceState state, const std::string& reason, std::uint64_t rejected) {
+    const std::scoped_lock lock{mutex_};
+    reported_ = state;
+    health_.rejected = rejected;
+    set_state(state, reason);
   }
 
   void count_rejected(const std::string& reason) {
@@ -81,6 +92,7 @@ class Port final : public Source<Sink> {
   mutable std::mutex mutex_;  // held while the sink runs, so that stop() waits for it
   Sink* sink_ = nullptr;
   SourceHealth health_;
+  SourceState reported_ = SourceState::kStreaming;
 };
 
 }  // namespace geoflow::drivers

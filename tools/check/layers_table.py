@@ -82,6 +82,8 @@ THREAD_FILES = (
     "hal/src/log.cpp",  # the sink is called under a lock
     "drivers/can/legs_source.cpp",  # reads the legs' bus on a thread of its own
     "drivers/can/legs_source.hpp",
+    "drivers/dds/robot_source.cpp",  # reads the robot's messages on a thread of its own
+    "drivers/dds/robot_source.hpp",
     "drivers/replay/bag/writer.cpp",  # samples are written from the threads that bring them
     "drivers/replay/port.hpp",  # a port's sink is started and stopped while the recording plays
     "drivers/replay/prefetcher.cpp",  # decodes images ahead of the replay

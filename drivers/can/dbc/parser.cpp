@@ -191,9 +191,10 @@ class Parser {
       return;
     }
     std::uint64_t value = 0;
-    const char* const last = token.text.data() + token.text.size();
-    const auto [end, failed] = std::from_chars(token.text.data() + 1, last, value);
-    if (token.text.front() != 'm' || failed != std::errc{} || end != last) {
+    const std::string_view digits = token.text.substr(1);
+    const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (token.text.front() != 'm' || failed != std::errc{} ||
+        end != digits.data() + digits.size()) {
       tokens_.refuse(token.line,
                      fmt::format("'{}' is no multiplexing (M, or m and a number)", token.text));
     }

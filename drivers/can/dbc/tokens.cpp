@@ -131,9 +131,9 @@ double Tokens::number(std::string_view what) {
 std::uint32_t Tokens::whole(std::string_view what) {
   const Token token = of_kind(TokenKind::kNumber, what);
   std::uint32_t value = 0;
-  const char* const last = token.text.data() + token.text.size();
-  const auto [end, failed] = std::from_chars(token.text.data(), last, value);
-  if (failed != std::errc{} || end != last) {
+  const std::string_view digits = token.text;
+  const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (failed != std::errc{} || end != digits.data() + digits.size()) {
     refuse(token.line, fmt::format("'{}' is not {}", token.text, what));
     return 0;
   }
