@@ -351,6 +351,20 @@ TEST_F(D435iTest, TheImuSpeaksInTheChipsAxesWhenItIsSwitchedOn) {
   }
 }
 
+TEST_F(D435iTest, TheLatestReportCanBeAskedFor) {
+  world->add_imu({.accel_mps2 = {0, 9.80665, 0}}, {});
+  plug();
+  for (const unsigned id : {1U, 2U, 3U}) {
+    const auto none = get(0xa1, 1, static_cast<std::uint16_t>(0x0100U | id), 5, 64);
+    ASSERT_TRUE(none);
+    EXPECT_EQ(none->size(), id == 3 ? 26U : 32U);
+    EXPECT_EQ(field<std::uint8_t>(*none, 0), id);
+  }
+  switch_on(*this, 1, 500);
+  EXPECT_EQ(get(0xa1, 1, 0x0101, 5, 64), fetch(0x86, kMillisecond).at(0));
+  EXPECT_FALSE(get(0xa1, 1, 0x0104, 5, 64));
+}
+
 TEST_F(D435iTest, NewerFirmwareReportsFinerRates) {
   const ImuSample sample{.accel_mps2 = {0, 0, 9.80665}, .gyro_radps = {0.0123, 0, 0}};
   world->add_imu(sample, {});

@@ -1,11 +1,11 @@
 #include "geoflow/tools/emulator/recorded_world.hpp"
 
-#include <cstdint>
+#include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 

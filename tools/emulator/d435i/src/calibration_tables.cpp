@@ -3,12 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <utility>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/emulator/byte_writer.hpp"
+#include "geoflow/tools/emulator/checksum.hpp"
 #include "geoflow/tools/emulator/usb_device.hpp"
 
 #include "src/image_packer.hpp"
@@ -31,7 +31,9 @@ Bytes with_header(const TableHeader& header, ByteWriter content, std::size_t siz
   constexpr unsigned kByteBits = 8;
   content.pad_to(size - kHeaderSize);
   ByteWriter table;
-  table.u8(header.version >> kByteBits).u8(header.version & 0xffU).put(header.type);
+  table.u8(header.version >> kByteBits)
+      .put(static_cast<std::uint8_t>(header.version))
+      .put(header.type);
   table.u32(size - kHeaderSize).u32(0).put(crc32(content.view()));
   return table.bytes(content.view()).take();
 }
@@ -60,19 +62,6 @@ void put_focal_and_centre(ByteWriter& to, const CameraIntrinsics& camera) {
 }
 
 }  // namespace
-
-std::uint32_t crc32(std::span<const std::byte> bytes) noexcept {
-  constexpr std::uint32_t kPolynomial = 0xEDB88320;
-  constexpr int kByteBits = 8;
-  std::uint32_t crc = ~std::uint32_t{0};
-  for (const std::byte byte : bytes) {
-    crc ^= std::to_integer<std::uint32_t>(byte);
-    for (int bit = 0; bit < kByteBits; ++bit) {
-      crc = (crc >> 1U) ^ ((crc & 1U) != 0 ? kPolynomial : 0U);
-    }
-  }
-  return ~crc;
-}
 
 Bytes depth_table(const CameraIntrinsics& source) {
   using Size = std::pair<int, int>;

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <span>
-
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/tools/emulator/usb_device.hpp"
@@ -12,10 +8,6 @@
 /// colour image and which has no distortion. Layouts: librealsense's structures, numbers little
 /// endian, matrices column by column.
 namespace geoflow::emulator {
-
-/// CRC-32 (polynomial 0xEDB88320, initial value and final xor 0xFFFFFFFF), as the tables' headers
-/// have it.
-[[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes) noexcept;
 
 /// Table 25 (512 bytes): stereo geometry, and focal lengths and centres of the rectified left image
 /// for each size.

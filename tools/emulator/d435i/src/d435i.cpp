@@ -11,6 +11,8 @@
 #include <utility>
 #include <variant>
 
+#include <tl/expected.hpp>
+
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
@@ -207,8 +209,8 @@ void Camera::live(HostTime now) {
   if (!powered_at_) {
     powered_at_ = now;
   }
-  const bool watching = motion_.active() || std::any_of(streams_.begin(), streams_.end(),
-                                                        [](const auto& s) { return s.active(); });
+  const bool watching =
+      motion_.active() || std::ranges::any_of(streams_, [](const auto& s) { return s.active(); });
   player_.run(watching, now);
   while (const auto sample = player_.next(now)) {
     sense(*sample);
@@ -316,7 +318,7 @@ std::optional<Bytes> Camera::monitor(const SetupPacket& setup, std::span<const s
     case UvcRequest::kGetCur:
       return monitor_.reply();
     case UvcRequest::kGetMax:
-      return Bytes(kMonitorSize, std::byte{0xff});
+      return Bytes(kMonitorSize, ~std::byte{0});
     case UvcRequest::kGetMin:
     case UvcRequest::kGetRes:
     case UvcRequest::kGetDef:

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "geoflow/tools/emulator/byte_writer.hpp"
 #include "geoflow/tools/emulator/d435i.hpp"

@@ -58,6 +58,7 @@ constexpr std::uint32_t kClockRegister = 0x0001613c;
 constexpr std::uint32_t kClockRegisterEnd = 0x00016140;
 
 constexpr double kMicrometresPerMetre = 1e6;
+constexpr std::int64_t kMicrometresPerMillimetre = 1000;
 
 template <typename Integer>
 Integer read(std::span<const std::byte> bytes, std::size_t offset) {
@@ -121,7 +122,8 @@ HardwareMonitor::HardwareMonitor(const D435iOptions& options, const Calibration&
     : options_{options},
       calibration_{calibration},
       // Only advanced mode can say a unit of depth other than a millimetre.
-      advanced_{std::lround(calibration.depth_unit_m * kMicrometresPerMetre) != 1000},
+      advanced_{std::lround(calibration.depth_unit_m * kMicrometresPerMetre) !=
+                kMicrometresPerMillimetre},
       reply_(kMonitorSize) {
   const auto bottom = static_cast<std::uint16_t>(calibration.camera.height - 1);
   const auto right = static_cast<std::uint16_t>(calibration.camera.width - 1);
@@ -172,8 +174,8 @@ HardwareMonitor::Answer HardwareMonitor::answer(const Command& command, std::uin
   const auto& p = command.parameters;
   const auto region_of = [&] {
     Region region{};
-    std::transform(p.begin(), p.end(), region.begin(),
-                   [](std::uint32_t value) { return static_cast<std::uint16_t>(value); });
+    std::ranges::transform(p, region.begin(),
+                           [](std::uint32_t value) { return static_cast<std::uint16_t>(value); });
     return region;
   };
   switch (command.opcode) {

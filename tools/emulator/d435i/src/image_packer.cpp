@@ -1,13 +1,10 @@
 #include "src/image_packer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
@@ -39,9 +36,9 @@ struct Yuv {
 
 /// Video range, as the camera's colour is.
 Yuv to_yuv(const Rgb& c) {
-  return {static_cast<std::uint8_t>(((66 * c.r + 129 * c.g + 25 * c.b + 128) >> 8) + 16),
-          static_cast<std::uint8_t>(((-38 * c.r - 74 * c.g + 112 * c.b + 128) >> 8) + 128),
-          static_cast<std::uint8_t>(((112 * c.r - 94 * c.g - 18 * c.b + 128) >> 8) + 128)};
+  return {.y = static_cast<std::uint8_t>(((66 * c.r + 129 * c.g + 25 * c.b + 128) >> 8) + 16),
+          .u = static_cast<std::uint8_t>(((-38 * c.r - 74 * c.g + 112 * c.b + 128) >> 8) + 128),
+          .v = static_cast<std::uint8_t>(((112 * c.r - 94 * c.g - 18 * c.b + 128) >> 8) + 128)};
 }
 
 /// Full range, as the imagers' gray is.
@@ -54,35 +51,36 @@ Rgb to_rgb(const Yuv& c) {
   const int u = c.u - 128;
   const int v = c.v - 128;
   const auto clamped = [](int value) { return std::clamp((value + 128) >> 8, 0, 255); };
-  return {clamped(y + 409 * v), clamped(y - 100 * u - 208 * v), clamped(y + 516 * u)};
+  return {
+      .r = clamped(y + 409 * v), .g = clamped(y - 100 * u - 208 * v), .b = clamped(y + 516 * u)};
 }
 
 // NOLINTEND(readability-magic-numbers)
 
 /// The colour of one pixel of an image of any format.
-template <PixelFormat format>
+template <PixelFormat Format>
 Rgb color_at(const std::uint8_t* pixels, std::size_t index) {
-  if constexpr (format == PixelFormat::kGray8) {
-    return {pixels[index], pixels[index], pixels[index]};
-  } else if constexpr (format == PixelFormat::kYuyv) {
+  if constexpr (Format == PixelFormat::kGray8) {
+    return {.r = pixels[index], .g = pixels[index], .b = pixels[index]};
+  } else if constexpr (Format == PixelFormat::kYuyv) {
     const std::uint8_t* pair = pixels + 4 * (index / 2);
-    return to_rgb({pixels[2 * index], pair[1], pair[3]});
+    return to_rgb({.y = pixels[2 * index], .u = pair[1], .v = pair[3]});
   } else {
     const std::uint8_t* pixel = pixels + 3 * index;
-    constexpr bool kBlueFirst = format == PixelFormat::kBgr8;
-    return {pixel[kBlueFirst ? 2 : 0], pixel[1], pixel[kBlueFirst ? 0 : 2]};
+    constexpr bool kBlueFirst = Format == PixelFormat::kBgr8;
+    return {.r = pixel[kBlueFirst ? 2 : 0], .g = pixel[1], .b = pixel[kBlueFirst ? 0 : 2]};
   }
 }
 
 /// Calls `use(pixel, colour)` for each pixel of the view, in order.
-template <PixelFormat format, typename Use>
+template <PixelFormat Format, typename Use>
 void for_each_color_of(const PixelMap& map, const FrameRef& image, const Use& use) {
   const auto* pixels = image.row<std::uint8_t>(0);
   for (std::size_t i = 0; i < map.size(); ++i) {
     const std::int32_t source = map[i];
     use(i, source == PixelMap::kOutside
                ? Rgb{}
-               : color_at<format>(pixels, static_cast<std::size_t>(source)));
+               : color_at<Format>(pixels, static_cast<std::size_t>(source)));
   }
 }
 
@@ -133,10 +131,11 @@ std::vector<std::uint8_t> right_of(const std::vector<std::uint8_t>& left,
   constexpr int kNothing = -1;
   std::vector<int> shift(width);
   for (std::size_t row = 0; row < left.size(); row += width) {
-    std::fill(shift.begin(), shift.end(), kNothing);
+    std::ranges::fill(shift, kNothing);
     for (std::size_t x = 0; x < width; ++x) {
       const std::uint16_t z = depth[row + x];
-      const auto disparity = z == 0 ? 0 : static_cast<std::size_t>(disparity_depth / z + 0.5);
+      const auto disparity =
+          z == 0 ? std::size_t{0} : static_cast<std::size_t>(std::lround(disparity_depth / z));
       if (disparity <= x && static_cast<int>(disparity) > shift[x - disparity]) {
         shift[x - disparity] = static_cast<int>(disparity);
         right[row + x - disparity] = left[row + x];

@@ -1,6 +1,5 @@
 #include "src/motion_module.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -27,6 +26,7 @@ enum PowerState : std::uint8_t { kFull = 2, kOff = 6 };
 
 constexpr std::uint8_t kAccelerometer = 1;
 constexpr std::uint8_t kGyroscope = 2;
+constexpr std::uint8_t kCustom = 3;
 constexpr std::size_t kFeatureSize = 9;
 constexpr std::size_t kReportLimit = 64;  // not yet fetched
 
@@ -132,6 +132,10 @@ std::optional<Bytes> MotionModule::request(const SetupPacket& setup,
   if (setup.request == kGetReport && setup.is_in() && type == kFeature) {
     return feature(report);
   }
+  if (setup.request == kGetReport && setup.is_in() && type == kInput) {
+    const Bytes& latest = sensors_[report - 1U].latest;
+    return latest.empty() ? encode(report, Vector3d::Zero(), 0) : latest;
+  }
   if (setup.request == kSetReport && !setup.is_in() && type == kFeature &&
       set_feature(report, out)) {
     return Bytes{};
@@ -161,12 +165,12 @@ void MotionModule::feel(const ImuSample& sample, std::uint64_t device_us, Durati
   }
 }
 
-void MotionModule::report(std::uint8_t id, const Vector3d& counts, std::uint64_t device_us) {
+Bytes MotionModule::encode(std::uint8_t id, const Vector3d& counts, std::uint64_t device_us) const {
   constexpr unsigned kReady = 2;
   constexpr std::size_t kNotSaid = 14;  // custom values 1 to 5
   ByteWriter to;
   to.put(id).u8(kReady).put(device_us);
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+  for (Eigen::Index axis = 0; axis < 3 && id != kCustom; ++axis) {
     const auto count = static_cast<std::int32_t>(counts[axis]);
     if (wide_) {
       to.put(count);
@@ -174,12 +178,19 @@ void MotionModule::report(std::uint8_t id, const Vector3d& counts, std::uint64_t
       to.put(static_cast<std::int16_t>(count));
     }
   }
-  to.pad_to(to.size() + kNotSaid).put(sensors_[id - 1U].counter++).put(sent_++);
+  return to.pad_to(to.size() + kNotSaid).put(sensors_[id - 1U].counter).put(sent_).take();
+}
+
+void MotionModule::report(std::uint8_t id, const Vector3d& counts, std::uint64_t device_us) {
+  Sensor& sensor = sensors_[id - 1U];
+  sensor.latest = encode(id, counts, device_us);
+  ++sensor.counter;
+  ++sent_;
   if (reports_.size() == kReportLimit) {
     reports_.pop_front();
     ++dropped_;
   }
-  reports_.push_back(to.take());
+  reports_.push_back(sensor.latest);
 }
 
 std::optional<Bytes> MotionModule::next_report() {

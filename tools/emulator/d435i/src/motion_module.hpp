@@ -46,11 +46,14 @@ class MotionModule {
     std::uint16_t sensitivity = 0;
     std::optional<Duration> due{};
     std::uint8_t counter = 0;
+    Bytes latest{};  ///< report
   };
   static constexpr std::size_t kSensors = 3;
 
   [[nodiscard]] Bytes feature(std::uint8_t report) const;
   [[nodiscard]] bool set_feature(std::uint8_t report, std::span<const std::byte> out);
+  [[nodiscard]] Bytes encode(std::uint8_t id, const Vector3d& counts,
+                             std::uint64_t device_us) const;
   void report(std::uint8_t id, const Vector3d& counts, std::uint64_t device_us);
 
   bool wide_;

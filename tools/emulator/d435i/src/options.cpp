@@ -16,9 +16,8 @@ namespace {
 
 bool is_serial(const std::string& text) {
   constexpr std::size_t kDigits = 12;
-  return text.size() == kDigits && std::all_of(text.begin(), text.end(), [](unsigned char c) {
-           return std::isxdigit(c) != 0;
-         });
+  return text.size() == kDigits &&
+         std::ranges::all_of(text, [](unsigned char c) { return std::isxdigit(c) != 0; });
 }
 
 }  // namespace

@@ -21,11 +21,13 @@ struct Block {
   std::uint32_t version = 0;
   std::uint32_t flags = 0;
 };
+// NOLINTBEGIN(modernize-use-designated-initializers): a table, in the order of Block's members
 constexpr Block kCaptureTiming{0x80000001, 40, 1, 0x3f};
 constexpr Block kCaptureStats{0x00000003, 80, 0, 0xc01};  // exposure, frame rate and time are valid
 constexpr Block kDepthControl{0x80000000, 60, 1, 0xff};
 constexpr Block kRgbControl{0x80000005, 72, 1, 0x3fff};
 constexpr Block kConfiguration{0x80000002, 40, 3, 0x7ff};
+// NOLINTEND(modernize-use-designated-initializers)
 constexpr std::size_t kBlocks = kCaptureTiming.size + kCaptureStats.size + kConfiguration.size;
 
 /// Depth type, projector, colour and IMU (kernel documentation, metafmt-d4xx: sku_id).

@@ -18,6 +18,9 @@ constexpr std::array<std::uint32_t, 2> k30And15{333333, 666666};
 constexpr std::array<std::uint32_t, 2> k25And15{400000, 666666};
 constexpr std::array<std::uint32_t, 1> k30{333333};
 
+// NOLINTBEGIN(modernize-use-designated-initializers): tables, in the order of their structs'
+// members NOLINTBEGIN(readability-magic-numbers): GUIDs
+
 // The pair of grays has one size more than the others.
 constexpr std::array<FrameSize, 9> kStereoSizes{{{256, 144, k300And90},
                                                  {424, 240, kFrom90To6},
@@ -70,6 +73,9 @@ constexpr std::array<VideoInterface, kVideoStreamCount> kInterfaces{
     {{1, 0x82, 5, 4, kDepthFormats},
      {2, 0x83, 8, 5, kInfraredFormats},
      {4, 0x84, 6, 9, kColorFormats}}};
+
+// NOLINTEND(readability-magic-numbers)
+// NOLINTEND(modernize-use-designated-initializers)
 
 }  // namespace
 

@@ -54,7 +54,8 @@ SetupPacket decode_setup(std::span<const std::byte> bytes) {
   const auto u16 = [&](std::size_t i) {
     return static_cast<std::uint16_t>(u8(i) | (unsigned{u8(i + 1)} << kByteBits));
   };
-  return {u8(0), u8(1), u16(2), u16(4), u16(6)};
+  return {
+      .request_type = u8(0), .request = u8(1), .value = u16(2), .index = u16(4), .length = u16(6)};
 }
 
 Result<UrbCommand> decode_submit(std::span<const std::byte> header) {

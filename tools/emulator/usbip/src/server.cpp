@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include <arpa/inet.h>
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/types.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
@@ -58,7 +58,9 @@ Result<Announcement> announcement_of(UsbDevice& device, HostTime now) {
   constexpr std::uint8_t kIn = 0x80;
   constexpr std::uint8_t kGetDescriptor = 6;
   const auto read = [&](std::uint16_t value) {
-    return device.control({kIn, kGetDescriptor, value, 0, UINT16_MAX}, {}, now);
+    return device.control(
+        {.request_type = kIn, .request = kGetDescriptor, .value = value, .length = UINT16_MAX}, {},
+        now);
   };
   constexpr std::uint16_t kDevice = 0x0100;
   constexpr std::uint16_t kConfiguration = 0x0200;
@@ -85,8 +87,8 @@ class Server final : public UsbIpServer {
 
   [[nodiscard]] std::uint16_t port() const override { return port_; }
   [[nodiscard]] bool attached() const override {
-    return std::any_of(clients_.begin(), clients_.end(),
-                       [](const Client& client) { return client.session.has_value(); });
+    return std::ranges::any_of(clients_,
+                               [](const Client& client) { return client.session.has_value(); });
   }
   [[nodiscard]] Result<void> serve(Duration at_most) override;
 

@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -51,7 +53,8 @@ Result<void> Session::feed(std::span<const std::byte> bytes, HostTime now) {
     if (!command) {
       return tl::unexpected{command.error()};
     }
-    const std::size_t data = command->submit ? command->submit->out_size() : 0;
+    const std::optional<Submit>& submitted = command->submit;
+    const std::size_t data = submitted ? submitted->out_size() : 0;
     if (rest.size() - kUrbHeaderSize < data) {
       break;
     }

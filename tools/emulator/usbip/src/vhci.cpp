@@ -7,10 +7,9 @@
 #include <sstream>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <sys/socket.h>
 #include <tl/expected.hpp>
 #include <unistd.h>

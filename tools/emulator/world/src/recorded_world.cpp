@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 #include <utility>
-#include <variant>
 
 #include <tl/expected.hpp>
 
@@ -61,6 +60,8 @@ class Collector final : public CameraSink, public ImuSink {
 class RecordedWorld final : public World {
  public:
   explicit RecordedWorld(const RecordedWorldOptions& options) : options_{options} {}
+  RecordedWorld(const RecordedWorld&) = delete;
+  RecordedWorld& operator=(const RecordedWorld&) = delete;
   ~RecordedWorld() override { close(); }
 
   [[nodiscard]] Result<void> open();
@@ -69,6 +70,8 @@ class RecordedWorld final : public World {
 
  private:
   void close() noexcept;
+  /// At the end: the first sample again, where the options say so.
+  [[nodiscard]] Result<void> begin_again();
   [[nodiscard]] WorldSample on_our_time_line(WorldSample sample);
 
   RecordedWorldOptions options_;
@@ -125,6 +128,19 @@ WorldSample RecordedWorld::on_our_time_line(WorldSample sample) {
   return sample;
 }
 
+Result<void> RecordedWorld::begin_again() {
+  close();
+  if (!options_.loop || !origin_) {
+    return {};
+  }
+  round_start_ = last_sent_ + kBetweenRounds;
+  auto opened = open();
+  if (!opened) {
+    close();
+  }
+  return opened;
+}
+
 Result<std::optional<WorldSample>> RecordedWorld::next() {
   while (streams_) {
     if (auto sample = collector_.take()) {
@@ -134,15 +150,11 @@ Result<std::optional<WorldSample>> RecordedWorld::next() {
     if (!stepped) {
       return tl::unexpected{stepped.error()};
     }
-    if (!*stepped) {
-      close();
-      if (options_.loop && origin_) {
-        round_start_ = last_sent_ + kBetweenRounds;
-        if (auto reopened = open(); !reopened) {
-          close();
-          return tl::unexpected{std::move(reopened.error())};
-        }
-      }
+    if (*stepped) {
+      continue;
+    }
+    if (auto again = begin_again(); !again) {
+      return tl::unexpected{std::move(again.error())};
     }
   }
   return std::nullopt;

@@ -26,11 +26,13 @@ inline constexpr FirmwareVersion kWideImuFirmware{.major = 5, .minor = 16, .patc
 struct D435iOptions {
   /// What librealsense calls the serial number, and the USB serial number: 12 hexadecimal digits
   /// each.
+  // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
   std::string module_serial = "843112070435";
   std::string asic_serial = "843123050435";
   FirmwareVersion firmware{.major = 5, .minor = 12, .patch = 7, .build = 100};
   /// The device clock when the camera gets power [us]. It counts on in 32 bits.
   std::uint64_t clock_start_us = 1'000'000;
+  // NOLINTEND(readability-magic-numbers)
 };
 
 /// What was done so far. Never decreases.

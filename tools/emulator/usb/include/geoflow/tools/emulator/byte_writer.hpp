@@ -19,7 +19,7 @@ class ByteWriter {
   /// Any integer, in as many bytes as its type has.
   template <std::integral Integer>
   ByteWriter& put(Integer value) {
-    auto rest = static_cast<std::uint64_t>(value);
+    auto rest = std::uint64_t{static_cast<std::make_unsigned_t<Integer>>(value)};
     for (std::size_t i = 0; i < sizeof(Integer); ++i) {
       constexpr unsigned kByteBits = 8;
       bytes_.push_back(static_cast<std::byte>(rest));

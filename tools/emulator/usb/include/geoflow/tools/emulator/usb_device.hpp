@@ -43,7 +43,7 @@ enum class InStatus : std::uint8_t {
 /// interrupt endpoint one report.
 struct InTransfer {
   InStatus status = InStatus::kNothing;
-  Bytes data;
+  Bytes data{};
 };
 
 /// One device. It owns no thread and reads no clock: `now` never decreases from call to call.
