@@ -47,6 +47,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 /// Least determinant of a cell's pixels' scatter, relative to its diagonal.
 constexpr double kMinPixelSpread = 1e-3;
 constexpr double kPlaneParameters = 3.0;
+/// Cosine of incidence: a cell that seems to be seen edge on is no piece of a surface.
+constexpr double kEdgeOn = 0.0175;
 
 /// Depth that is used [counts], and counts of 1 / (1 m).
 struct DepthLimits {
@@ -184,6 +186,7 @@ Result<void> DepthCloud::build(const FrameRef& depth) {
   drop_edges();
   measure_noise();
   smooth_normals();
+  drop_grazing();
   return {};
 }
 
@@ -308,7 +311,7 @@ Surfel DepthCloud::fit(const Sums& sums, const CellGrid::Ray& ray) const noexcep
   const Eigen::Vector3d plane{g.x(), g.y(), inverse_depth - g.dot(at)};
   const double norm = plane.norm();
   const double z = 1.0 / inverse_depth;
-  if (inverse_depth < static_cast<double>(min_cosine_) * norm * std::sqrt(1.0 + at.squaredNorm())) {
+  if (inverse_depth < kEdgeOn * norm * std::sqrt(1.0 + at.squaredNorm())) {
     return {};
   }
   Surfel surfel;

@@ -101,6 +101,7 @@ class DepthCloud {
   void drop_edges();
   void measure_noise();
   void smooth_normals();
+  void drop_grazing();
   [[nodiscard]] Eigen::Vector4f smoothed_normal(std::uint32_t cell) const noexcept;
 
   std::shared_ptr<const CellGrid> grid_;

@@ -172,6 +172,18 @@ void DepthCloud::smooth_normals() {
   }
 }
 
+/// By the smoothed normal: a cell's own is so uncertain that, near the limit, it would choose cells
+/// by their errors.
+void DepthCloud::drop_grazing() {
+  for (const std::uint32_t cell : valid_) {
+    const Surfel& surfel = surfels_[cell];
+    if (-surfel.normal.dot(surfel.point) < min_cosine_ * surfel.point.norm()) {
+      surfels_[cell] = Surfel{};
+    }
+  }
+  std::erase_if(valid_, [this](std::uint32_t cell) { return !surfels_[cell].valid(); });
+}
+
 Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
   constexpr int kRings = 3;
   const Surfel& centre = surfels_[cell];

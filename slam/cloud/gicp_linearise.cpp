@@ -141,10 +141,16 @@ void add(const Problem& problem, const Surfel& source, float sample_weight, Part
   const float kernel = 1.0F / excess;  // Cauchy: rho(s) = k^2 log(1 + s / k^2)
   const float weight = sample_weight * kernel * inverse_variance;
 
+  // The lever arm ends at the pair's most likely point, whose error and the residual's are
+  // independent. With the source's own point they are not, and noise would turn into rotation.
+  const float towards_target =
+      source.normal_variance / (source.normal_variance + target->normal_variance);
+  const Eigen::Vector3f x =
+      p + towards_target * (problem.R.transpose() * (target->point - problem.t) - p);
   const Eigen::Vector3f m = problem.R.transpose() * common;
   Vector8f row;
-  row << p.y() * m.z() - p.z() * m.y(), p.z() * m.x() - p.x() * m.z(),
-      p.x() * m.y() - p.y() * m.x(), m.x(), m.y(), m.z(), residual, 0.0F;
+  row << x.y() * m.z() - x.z() * m.y(), x.z() * m.x() - x.x() * m.z(),
+      x.x() * m.y() - x.y() * m.x(), m.x(), m.y(), m.z(), residual, 0.0F;
   partial.system.noalias() += (weight * row) * row.transpose();
   const float tilt_variance = 0.25F * (source.tilt_variance + target->tilt_variance);
   const Eigen::Vector4f homogeneous = p.homogeneous();

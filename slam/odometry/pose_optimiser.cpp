@@ -40,14 +40,14 @@ struct PoseOptimiser::System {
   std::uint32_t depth_inliers = 0;
 };
 
-std::vector<VisualMatch> PoseOptimiser::expected(std::span<const VisualMatch> matches,
-                                                 const PosePrior& belief) const {
+std::vector<bool> PoseOptimiser::expected(std::span<const VisualMatch> matches,
+                                          const PosePrior& belief) const {
   constexpr double kChi2Of2At999Permille = 13.8;
   const SE3 T_cam_odom = belief.T_odom_cam.inverse();
   const Matrix6d P = inverse(belief.information);
-  std::vector<VisualMatch> found;
-  for (const VisualMatch& match : matches) {
-    const Vector3d p_cam = T_cam_odom * match.p_odom;
+  std::vector<bool> allowed(matches.size(), false);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Vector3d p_cam = T_cam_odom * matches[i].p_odom;
     if (p_cam.z() < kMinimumDepthM) {
       continue;
     }
@@ -55,12 +55,10 @@ std::vector<VisualMatch> PoseOptimiser::expected(std::span<const VisualMatch> ma
         camera_.project_jacobian(p_cam) * camera_point_jacobian(p_cam);
     const Eigen::Matrix2d S = J * P * J.transpose() + config_.pixel_sigma * config_.pixel_sigma *
                                                           Eigen::Matrix2d::Identity();
-    const Vector2d r = camera_.project(p_cam) - match.pixel;
-    if (r.dot(S.ldlt().solve(r)) < kChi2Of2At999Permille) {
-      found.push_back(match);
-    }
+    const Vector2d r = camera_.project(p_cam) - matches[i].pixel;
+    allowed[i] = r.dot(S.ldlt().solve(r)) < kChi2Of2At999Permille;
   }
-  return found;
+  return allowed;
 }
 
 double PoseOptimiser::pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const {
@@ -127,18 +125,18 @@ void PoseOptimiser::add_depth(const PoseProblem& problem, std::span<const Surfel
   }
 }
 
-void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
+void PoseOptimiser::classify(std::span<const VisualMatch> matches, const std::vector<bool>& allowed,
                              PoseSolution& solution) const {
   constexpr double kChi2Of2At95Percent = 5.991;
   const SE3 T_cam_odom = solution.T_odom_cam.inverse();
-  solution.inlier.assign(problem.matches.size(), false);
-  for (std::size_t i = 0; i < problem.matches.size(); ++i) {
-    const Vector3d p_cam = T_cam_odom * problem.matches[i].p_odom;
-    if (p_cam.z() < kMinimumDepthM) {
+  const double variance = solution.pixel_sigma * solution.pixel_sigma;
+  solution.inlier.assign(matches.size(), false);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Vector3d p_cam = T_cam_odom * matches[i].p_odom;
+    if (!allowed[i] || p_cam.z() < kMinimumDepthM) {
       continue;
     }
-    const double chi2 =
-        (camera_.project(p_cam) - problem.matches[i].pixel).squaredNorm() / (sigma_px * sigma_px);
+    const double chi2 = (camera_.project(p_cam) - matches[i].pixel).squaredNorm() / variance;
     if (chi2 < kChi2Of2At95Percent) {
       solution.inlier[i] = true;
       ++solution.visual_inliers;
@@ -149,12 +147,16 @@ void PoseOptimiser::classify(const PoseProblem& problem, double sigma_px,
 PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) const {
   constexpr double kConverged = 1e-5;  // [rad], [m]
   PoseSolution solution;
+  const std::vector<bool> allowed = whole.reckoned ? expected(whole.matches, *whole.reckoned)
+                                                   : std::vector<bool>(whole.matches.size(), true);
   std::vector<VisualMatch> gated;
-  PoseProblem problem = whole;
-  if (whole.reckoned) {
-    gated = expected(whole.matches, *whole.reckoned);
-    problem.matches = gated;
+  for (std::size_t i = 0; i < allowed.size(); ++i) {
+    if (allowed[i]) {
+      gated.push_back(whole.matches[i]);
+    }
   }
+  PoseProblem problem = whole;
+  problem.matches = gated;
   solution.T_odom_cam = start;
   std::vector<SurfelSample> sample;
   if (problem.cloud != nullptr && !problem.targets.empty()) {
@@ -180,7 +182,7 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) co
       break;
     }
   }
-  classify(whole, solution.pixel_sigma, solution);
+  classify(whole.matches, allowed, solution);
   return solution;
 }
 

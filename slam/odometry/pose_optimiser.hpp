@@ -41,8 +41,9 @@ struct PoseProblem {
   std::span<const DepthTarget> targets;
   PosePrior prior;  ///< the prediction: decides what nothing else sees
   /// Where legs and IMU alone see the camera, from the last keyframe on: matches that contradict it
-  /// are left out. Things that move by themselves do, and mirror images: those follow the camera by
-  /// so little in each frame that only the whole way tells them from what they are seen on.
+  /// are left out, and no inliers. Things that move by themselves do, and mirror images: those
+  /// follow the camera by so little in each frame that only the whole way tells them from what they
+  /// are seen on.
   std::optional<PosePrior> reckoned{};
 };
 
@@ -78,15 +79,17 @@ class PoseOptimiser {
 
  private:
   struct System;
-  /// The matches that a belief allows, by chi-squared at 99.9 %.
-  [[nodiscard]] std::vector<VisualMatch> expected(std::span<const VisualMatch> matches,
-                                                  const PosePrior& belief) const;
+  /// For each match whether a belief allows it, by chi-squared at 99.9 %.
+  [[nodiscard]] std::vector<bool> expected(std::span<const VisualMatch> matches,
+                                           const PosePrior& belief) const;
   [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
   void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
                   System& system) const;
   void add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
                  const SE3& T_odom_cam, System& system) const;
-  void classify(const PoseProblem& problem, double sigma_px, PoseSolution& solution) const;
+  /// Which matches fit the solution, of those that are allowed.
+  void classify(std::span<const VisualMatch> matches, const std::vector<bool>& allowed,
+                PoseSolution& solution) const;
 
   PoseConfig config_;
   MappingConfig mapping_;
