@@ -351,6 +351,18 @@ TEST_F(D435iTest, TheImuSpeaksInTheChipsAxesWhenItIsSwitchedOn) {
   }
 }
 
+TEST_F(D435iTest, LinuxSetsAnIntervalBeforeItKnowsThePowerState) {
+  plug();
+  const auto power = [&](const std::optional<Bytes>& feature) {
+    return feature ? field<std::uint8_t>(*feature, 3) : 0;
+  };
+  EXPECT_TRUE(set(0x21, 9, 0x0302, 5, bytes_of({2, 0, 0, 0, 0, 0xf4, 1, 0, 0})));
+  auto feature = get(0xa1, 1, 0x0302, 5, 9);
+  EXPECT_EQ(power(feature), 6) << "off, as before";
+  EXPECT_EQ(field<std::uint16_t>(feature.value_or(Bytes(9)), 5), 500);
+  EXPECT_FALSE(set(0x21, 9, 0x0302, 5, bytes_of({2, 0, 0, 7, 0, 0xf4, 1, 0, 0})));
+}
+
 TEST_F(D435iTest, TheLatestReportCanBeAskedFor) {
   world->add_imu({.accel_mps2 = {0, 9.80665, 0}}, {});
   plug();

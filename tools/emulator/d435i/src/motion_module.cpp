@@ -108,10 +108,11 @@ bool MotionModule::set_feature(std::uint8_t report, std::span<const std::byte> o
   constexpr std::size_t kSensitivityAt = 7;
   const auto power = std::to_integer<std::uint8_t>(out[kPowerAt]);
   Sensor& sensor = sensors_[report - 1U];
-  if (power < 1 || power > kOff) {
+  if (power > kOff) {
     return false;
   }
-  sensor.power = power;
+  // A host that has not read the report yet, as Linux, knows no state and says 0.
+  sensor.power = power == 0 ? sensor.power : power;
   sensor.interval_ms = u16_at(kIntervalAt);
   sensor.sensitivity = u16_at(kSensitivityAt);
   sensor.due.reset();
