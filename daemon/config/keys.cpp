@@ -6,6 +6,7 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/drivers/can_legs.hpp"
+#include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/nearest_name.hpp"
 #include "geoflow/slam/config.hpp"
@@ -26,6 +27,7 @@ void bind_source(SourceConfig& c, std::vector<Key>& keys) {
   keys.push_back({"source.realtime", &c.realtime});
   keys.push_back({"source.loop", &c.loop});
   keys.push_back({"source.legs", &c.legs});
+  keys.push_back({"source.imu", &c.imu});
 }
 
 void bind_topics(drivers::TopicNames& c, std::vector<Key>& keys) {
@@ -42,6 +44,12 @@ void bind_can(drivers::CanLegsOptions& c, std::vector<Key>& keys) {
   keys.push_back({"can.interfaces", &c.interfaces});
   keys.push_back({"can.dictionary", &c.dictionary});
   keys.push_back({"can.log", &c.log});
+}
+
+void bind_dds(drivers::DdsRobotOptions& c, std::vector<Key>& keys) {
+  keys.push_back({"dds.interface", &c.interface});
+  keys.push_back({"dds.domain", &c.domain, 0, 230});
+  keys.push_back({"dds.topic", &c.topic});
 }
 
 void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) {
@@ -151,6 +159,7 @@ std::vector<Key> bind_keys(Config& config) {
   bind_source(config.source, keys);
   bind_topics(config.topics, keys);
   bind_can(config.can, keys);
+  bind_dds(config.dds, keys);
   bind_synchroniser(config.synchroniser, keys);
   bind_slam(config.slam, keys);
   bind_socket(config.socket, keys);

@@ -23,9 +23,8 @@ PoseEstimate process_packet(Run& run, const SyncedPacket& packet) {
 
 timesync::SynchroniserStreams synchroniser_streams(Run& run) {
   const Ports ports = run.ports();
-  timesync::SynchroniserStreams described{
-      .camera = ports.camera.stamps(),
-      .timeshift_cam_imu = run.streams->calibration().timeshift_cam_imu};
+  timesync::SynchroniserStreams described{.camera = ports.camera.stamps(),
+                                          .timeshift_cam_imu = run.calibration.timeshift_cam_imu};
   if (ports.imu != nullptr) {
     described.imu = ports.imu->stamps();
   }

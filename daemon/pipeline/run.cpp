@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <malloc.h>
@@ -12,8 +13,10 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/can_legs.hpp"
+#include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/slam/core.hpp"
@@ -36,21 +39,59 @@ drivers::RecordingOptions recording_options(const Config& config) {
           .color_as_gray = true};
 }
 
-/// The device that source.legs names; null where it names none.
-Result<std::unique_ptr<Legs>> open_legs(const Config& config) {
-  const std::string& device = config.source.legs;
-  if (device.empty()) {
-    return nullptr;
-  }
-  if (device != "can") {
-    return fail(ErrorCode::kInvalidArgument, "source.legs: '{}' is no device; there is: can",
-                device);
-  }
-  if (!config.source.realtime) {
+/// Takes legs, IMU or both from a robot on DDS. The body's IMU stands elsewhere than the camera's.
+Result<void> open_robot(const Config& config, Run& run) {
+  const bool with_imu = !config.source.imu.empty();
+  if (with_imu && !run.calibration.T_base_cam) {
     return fail(ErrorCode::kInvalidArgument,
-                "source.legs: a device keeps its own pace, so source.realtime must be true");
+                "source.imu: the body's IMU is of no use where the calibration does not say where "
+                "the camera is on the robot (T_base_cam)");
   }
-  return drivers::open_can_legs(config.can);
+  auto opened = drivers::DdsRobot::open(config.dds);
+  if (!opened) {
+    return tl::unexpected{std::move(opened.error())};
+  }
+  const std::shared_ptr<drivers::DdsRobot> robot = std::move(*opened);
+  if (!config.source.legs.empty() && !run.legs) {
+    run.legs = {robot, &robot->legs()};
+  }
+  if (with_imu) {
+    run.imu = {robot, &robot->body_imu()};
+    const SE3 T_base_cam = *run.calibration.T_base_cam;
+    const SE3 T_base_imu = drivers::body_imu_in_base();
+    run.calibration.T_cam_imu = T_base_cam.inverse() * T_base_imu;
+    run.calibration.timeshift_cam_imu = {};
+  }
+  return {};
+}
+
+constexpr std::string_view kCan = "can";
+constexpr std::string_view kDds = "dds";
+
+/// Makes the devices that source.legs and source.imu name stand in for the recording's.
+Result<void> open_devices(const Config& config, Run& run) {
+  const std::string& legs = config.source.legs;
+  const std::string& imu = config.source.imu;
+  if (!legs.empty() && legs != kCan && legs != kDds) {
+    return fail(ErrorCode::kInvalidArgument, "source.legs: '{}' is no device; there are: can, dds",
+                legs);
+  }
+  if (!imu.empty() && imu != kDds) {
+    return fail(ErrorCode::kInvalidArgument, "source.imu: '{}' is no device; there is: dds", imu);
+  }
+  if ((!legs.empty() || !imu.empty()) && !config.source.realtime) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.legs, source.imu: a device keeps its own pace, so source.realtime must be "
+                "true");
+  }
+  if (legs == kCan) {
+    auto can = drivers::open_can_legs(config.can);
+    if (!can) {
+      return tl::unexpected{std::move(can.error())};
+    }
+    run.legs = std::move(*can);
+  }
+  return legs == kDds || imu == kDds ? open_robot(config, run) : Result<void>{};
 }
 
 /// Every frame allocates and frees the same image-sized blocks. By default glibc gives such blocks
@@ -81,7 +122,7 @@ Result<std::shared_ptr<const slam::StoredMap>> saved_map(const MapConfig& config
 
 Ports Run::ports() {
   return {.camera = streams->camera(),
-          .imu = streams->imu(),
+          .imu = imu ? imu.get() : streams->imu(),
           .legs = legs ? legs.get() : streams->legs()};
 }
 
@@ -96,17 +137,16 @@ Result<Run> open_run(const Config& config) {
     return tl::unexpected{std::move(streams.error())};
   }
   run.streams = std::move(*streams);
-  auto legs = open_legs(config);
-  if (!legs) {
-    return tl::unexpected{std::move(legs.error())};
+  run.calibration = run.streams->calibration();
+  if (auto devices = open_devices(config, run); !devices) {
+    return tl::unexpected{std::move(devices.error())};
   }
-  run.legs = std::move(*legs);
   run.statistics = std::make_unique<RunStatistics>();
-  auto map = saved_map(config.map, run.streams->calibration());
+  auto map = saved_map(config.map, run.calibration);
   if (!map) {
     run.map_refused = std::move(map.error());
   }
-  auto core = slam::Core::create(run.streams->calibration(), config.slam, &run.statistics->tracking,
+  auto core = slam::Core::create(run.calibration, config.slam, &run.statistics->tracking,
                                  map ? map->get() : nullptr);
   if (!core) {
     return tl::unexpected{std::move(core.error())};

@@ -153,7 +153,10 @@ nlohmann::json Worker::status() const {
                       {"calibration", run_.streams->calibration().source},
                       {"realtime", config_.source.realtime}};
   if (run_.legs) {
-    status["health"] = {{"legs", to_json(run_.legs->health())}};
+    status["health"]["legs"] = to_json(run_.legs->health());
+  }
+  if (run_.imu) {
+    status["health"]["imu"] = to_json(run_.imu->health());
   }
   return status;
 }

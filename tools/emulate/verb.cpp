@@ -27,6 +27,7 @@
 #include "geoflow/tools/emulator/usbip_server.hpp"
 #include "geoflow/tools/interrupt.hpp"
 
+#include "emulate/legs_command.hpp"
 #include "emulate/sent_log.hpp"
 
 namespace geoflow::tools {
@@ -43,7 +44,8 @@ constexpr std::string_view kExamples =
     "                                                        with what can go wrong\n"
     "  geoflow emulate d435i --recording bag --attach --clock-start 4290000000\n"
     "                                                        its clock wraps after 5 s\n"
-    "What the emulated camera is, and faults: docs/emulator.md.";
+    "  geoflow emulate legs --can vcan0                      a walking robot's legs\n"
+    "What the emulated camera is, and faults: docs/emulator.md; legs: docs/legs.md.";
 
 /// Four numbers with dots between them.
 Result<emulator::FirmwareVersion> parse_firmware(const std::string& text) {
@@ -61,7 +63,7 @@ Result<emulator::FirmwareVersion> parse_firmware(const std::string& text) {
   return emulator::FirmwareVersion{parts[0], parts[1], parts[2], parts[3]};
 }
 
-/// `geoflow emulate d435i`.
+/// `geoflow emulate DEVICE …`.
 class EmulateVerb final : public Verb {
  public:
   [[nodiscard]] std::string_view name() const override { return "emulate"; }
@@ -74,12 +76,16 @@ class EmulateVerb final : public Verb {
   [[nodiscard]] Result<ExitCode> run(Console& console) override;
 
  private:
+  void declare_d435i(CLI::App& d435i);
+  [[nodiscard]] Result<ExitCode> run_d435i(Console& console);
   [[nodiscard]] Result<std::unique_ptr<emulator::D435i>> camera();
   [[nodiscard]] Result<std::vector<emulator::TimedFault>> faults() const;
   [[nodiscard]] Result<ExitCode> serve(emulator::UsbDevice& device, const emulator::D435i& camera,
                                        Console& console) const;
   static void report(const emulator::D435iCounters& counters, Console& console);
 
+  CLI::App* legs_command_ = nullptr;
+  LegsCommand legs_;
   emulator::RecordedWorldOptions world_;
   emulator::D435iOptions options_;
   std::string calibration_;
@@ -92,7 +98,14 @@ class EmulateVerb final : public Verb {
 
 void EmulateVerb::declare(CLI::App& command) {
   command.require_subcommand(1);
-  CLI::App& d435i = *command.add_subcommand("d435i", "An Intel RealSense D435i, by USB/IP");
+  declare_d435i(*command.add_subcommand("d435i", "An Intel RealSense D435i, by USB/IP"));
+  legs_command_ = command.add_subcommand("legs", "A robot's legs, on CAN or DDS");
+  legs_command_->fallthrough();
+  legs_command_->footer("Examples:\n" + std::string{LegsCommand::examples()});
+  legs_.declare(*legs_command_);
+}
+
+void EmulateVerb::declare_d435i(CLI::App& d435i) {
   d435i.add_option("--recording", world_.path, "What it sees: a recording")->required();
   d435i.add_option("--calibration", calibration_, "Folder with Kalibr files");
   d435i.add_flag("--loop", world_.loop, "Begin the recording again at its end");
@@ -147,6 +160,10 @@ Result<std::vector<emulator::TimedFault>> EmulateVerb::faults() const {
 }
 
 Result<ExitCode> EmulateVerb::run(Console& console) {
+  return legs_command_->parsed() ? legs_.run(console) : run_d435i(console);
+}
+
+Result<ExitCode> EmulateVerb::run_d435i(Console& console) {
   auto faults = this->faults();
   if (!faults) {
     return tl::unexpected{std::move(faults.error())};

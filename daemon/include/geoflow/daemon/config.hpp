@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geoflow/drivers/can_legs.hpp"
+#include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -26,7 +27,8 @@ struct SourceConfig {
   std::uint64_t fault_seed = 0;
   bool realtime = true;  ///< at the pace it was recorded; else as fast as it can be worked on
   bool loop = false;     ///< begin again at its end
-  std::string legs{};    ///< `can`: legs come from there instead; empty: from the recording
+  std::string legs{};    ///< `can` or `dds`: from there; empty: from the recording
+  std::string imu{};     ///< `dds`: the body's IMU instead of the camera's; empty: the recording's
 };
 
 // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
@@ -59,6 +61,7 @@ struct Config {
   SourceConfig source;
   drivers::TopicNames topics;
   drivers::CanLegsOptions can;
+  drivers::DdsRobotOptions dds;
   timesync::SynchroniserConfig synchroniser;
   slam::Config slam;
   SocketConfig socket;

@@ -7,6 +7,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
@@ -30,7 +31,9 @@ struct Ports {
 /// work on.
 struct Run {
   std::unique_ptr<drivers::RecordedStreams> streams;
-  std::unique_ptr<Legs> legs{};  ///< a device's, in the place of the recording's; null: none
+  Calibration calibration{};     ///< the recording's, changed where a device stands in for a sensor
+  std::shared_ptr<Legs> legs{};  ///< a device's, in the place of the recording's; null: none
+  std::shared_ptr<Imu> imu{};    ///< likewise
   std::unique_ptr<RunStatistics> statistics;
   std::unique_ptr<slam::Core> core;
   /// Why the configured map was not taken; none where it was, or none is configured.
