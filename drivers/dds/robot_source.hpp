@@ -14,7 +14,7 @@
 
 #include "dds/channel.hpp"
 #include "dds/message_filter.hpp"
-#include "replay/port.hpp"
+#include "port.hpp"
 
 namespace geoflow::drivers::dds {
 

@@ -24,12 +24,12 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
 
+#include "port.hpp"
 #include "replay/calibration/find.hpp"
 #include "replay/decode.hpp"
 #include "replay/factory.hpp"
 #include "replay/faults/reader.hpp"
 #include "replay/faults/script.hpp"
-#include "replay/port.hpp"
 #include "replay/prefetcher.hpp"
 #include "replay/reader.hpp"
 

@@ -84,8 +84,11 @@ THREAD_FILES = (
     "drivers/can/legs_source.hpp",
     "drivers/dds/robot_source.cpp",  # reads the robot's messages on a thread of its own
     "drivers/dds/robot_source.hpp",
+    "drivers/d435i/device/device.cpp",  # tells other threads how the camera is, and waits interruptibly while it is away
     "drivers/replay/bag/writer.cpp",  # samples are written from the threads that bring them
-    "drivers/replay/port.hpp",  # a port's sink is started and stopped while the recording plays
+    "drivers/port.hpp",  # a port's sink is started and stopped while the recording plays
+    "drivers/v4l2/iio_sensor.cpp",  # the kernel turns a sensor on for up to two seconds
+    "drivers/v4l2/iio_sensor.hpp",
     "drivers/replay/prefetcher.cpp",  # decodes images ahead of the replay
     "drivers/replay/prefetcher.hpp",
     "drivers/replay/recorded_streams.cpp",  # paced replay waits for the next stamp, interruptibly

@@ -191,17 +191,17 @@ Result<ColorTable> parse_color_table(std::span<const std::byte> table) {
   parsed.width = fields.take<std::uint16_t>();
   parsed.height = fields.take<std::uint16_t>();
   fields.skip(kMatrixBytes);  // K of the rectified image
-  const Matrix3d R_depth_color = take_matrix(fields);
+  const Matrix3d R_depth_cam = take_matrix(fields);
   const Vector3d offset_mm = take_vector(fields);
   if (!fields.ok()) {
     return ends_early(kName, table.size());
   }
-  const Vector3d p_depth_color = -kMetresPerMillimetre * offset_mm;
-  if (!is_rotation(R_depth_color) || !is_offset(p_depth_color)) {
+  const Vector3d p_depth_cam = -kMetresPerMillimetre * offset_mm;
+  if (!is_rotation(R_depth_cam) || !is_offset(p_depth_cam)) {
     return fail(ErrorCode::kInvalidData, "{}: its rotation or translation is none of this camera",
                 kName);
   }
-  parsed.T_depth_color = SE3{R_depth_color, p_depth_color};
+  parsed.T_depth_cam = SE3{R_depth_cam, p_depth_cam};
   const bool finite =
       std::ranges::all_of(parsed.distortion, [](double k) { return std::isfinite(k); });
   if (parsed.width == 0 || parsed.height == 0 || !finite ||

@@ -31,7 +31,7 @@ struct ColorTable {
   int width = 0;                             ///< at which it was calibrated [px]
   int height = 0;                            ///< [px]
   std::array<double, kMaxDistortionCoefficients> distortion{};  ///< Brown-Conrady
-  SE3 T_depth_color;  ///< colour camera in the depth camera's frame [m]
+  SE3 T_depth_cam;  ///< colour camera in the depth camera's frame [m]
 };
 
 /// The IMU.

@@ -135,9 +135,9 @@ TEST(ColorTable, GivesIntrinsicsAndPose) {
   EXPECT_NEAR(wide.fy, 915.9, 0.05);
   EXPECT_NEAR(wide.cx, 631.4, 0.1);
   EXPECT_NEAR(wide.cy, 356.7, 0.1);
-  const Vector3d p_depth_color = table->T_depth_color.translation();
-  EXPECT_TRUE(p_depth_color.isApprox(Vector3d{-0.01501, 0.00136, -0.00025}, 1e-6));
-  EXPECT_NEAR(table->T_depth_color.rotation_matrix()(1, 0), 0.009402, 1e-5);
+  const Vector3d p_depth_cam = table->T_depth_cam.translation();
+  EXPECT_TRUE(p_depth_cam.isApprox(Vector3d{-0.01501, 0.00136, -0.00025}, 1e-6));
+  EXPECT_NEAR(table->T_depth_cam.rotation_matrix()(1, 0), 0.009402, 1e-5);
 }
 
 TEST(ColorTable, RefusesAPoseThatIsNone) {

@@ -10,8 +10,8 @@
 
 namespace geoflow::drivers {
 
-/// One port of a recording, or of a device that has several: whoever steps it delivers through it.
-/// Thread-safe, but start, stop and health must not be called from inside the sink.
+/// One port of a source: whoever steps or runs the source delivers through it. Thread-safe, but
+/// start, stop and health must not be called from inside the sink.
 template <typename Sink>
 class Port final : public Source<Sink> {
  public:
@@ -67,6 +67,19 @@ class Port final : public Source<Sink> {
   void count_rejected(const std::string& reason) {
     const std::scoped_lock lock{mutex_};
     ++health_.rejected;
+    set_state(SourceState::kDegraded, reason);
+  }
+
+  /// A sample was lost because all buffers are in use.
+  void count_dropped() {
+    const std::scoped_lock lock{mutex_};
+    ++health_.dropped;
+  }
+
+  /// Nothing comes, or not all that should; the next sample that is delivered says that all is
+  /// well.
+  void set_degraded(const std::string& reason) {
+    const std::scoped_lock lock{mutex_};
     set_state(SourceState::kDegraded, reason);
   }
 

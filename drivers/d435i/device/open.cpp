@@ -1,0 +1,73 @@
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+#include "geoflow/drivers/d435i.hpp"
+#include "geoflow/hal/log.hpp"
+#include "geoflow/hal/result.hpp"
+
+#include "d435i/core/transport.hpp"
+#include "d435i/device/device.hpp"
+#include "d435i/usb/usb_transport.hpp"
+#include "d435i/v4l2/v4l2_transport.hpp"
+#include "usb/libusb_port.hpp"
+#include "v4l2/topology.hpp"
+
+namespace geoflow::drivers {
+namespace {
+
+using d435i::Transport;
+
+Result<std::unique_ptr<Transport>> open_by_kernel(const std::string& serial) {
+  for (const v4l2::UsbCamera& camera : v4l2::find_cameras(d435i::kVendor, d435i::kProduct)) {
+    if (serial.empty() || camera.serial == serial) {
+      return d435i::open_v4l2_transport(camera);
+    }
+  }
+  return fail(ErrorCode::kNotFound, "no D435i{}{} is connected",
+              serial.empty() ? "" : " with the serial number ", serial);
+}
+
+Result<std::unique_ptr<Transport>> open_by_usb(const std::string& serial) {
+  return usb::open_device(d435i::kVendor, d435i::kProduct, serial)
+      .and_then([](std::unique_ptr<usb::Port> port) {
+        return d435i::open_usb_transport(std::move(port));
+      });
+}
+
+/// The kernel's drivers where they show depth, colour and both sensors; else USB.
+Result<std::unique_ptr<Transport>> open_by_either(const std::string& serial) {
+  constexpr std::size_t kImuSensors = 2;
+  const auto cameras = v4l2::find_cameras(d435i::kVendor, d435i::kProduct);
+  const auto camera = std::ranges::find_if(
+      cameras, [&](const v4l2::UsbCamera& one) { return serial.empty() || one.serial == serial; });
+  if (camera != cameras.end() && camera->iio.size() >= kImuSensors) {
+    auto opened = d435i::open_v4l2_transport(*camera);
+    if (opened) {
+      return opened;
+    }
+    log::debug("d435i", "not by the kernel's drivers: {}", opened.error().message);
+  }
+  return open_by_usb(serial);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<D435i>> D435i::open(const D435iOptions& options) {
+  switch (options.transport) {
+    case D435iTransport::kV4l2:
+      return d435i::open_device(options, &open_by_kernel);
+    case D435iTransport::kLibusb:
+      return d435i::open_device(options, &open_by_usb);
+    case D435iTransport::kAuto:
+      break;
+  }
+  return d435i::open_device(options, &open_by_either);
+}
+
+}  // namespace geoflow::drivers
