@@ -17,7 +17,6 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/saved_map.hpp"

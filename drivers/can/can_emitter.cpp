@@ -1,13 +1,15 @@
 #include <cerrno>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <system_error>
 #include <utility>
 
+#include <linux/can.h>
 #include <linux/can/raw.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/types.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
@@ -45,7 +47,7 @@ class CanEmitter final : public LegEmitter {
   }
 
  private:
-  Result<void> send(const can::KernelFrame& frame) const {
+  [[nodiscard]] Result<void> send(const can::KernelFrame& frame) const {
     ssize_t sent = ::write(socket_.get(), frame.bytes.data(), frame.size);
     if (sent < 0 && (errno == EAGAIN || errno == ENOBUFS)) {
       pollfd room{.fd = socket_.get(), .events = POLLOUT, .revents = 0};
@@ -79,7 +81,8 @@ Result<std::unique_ptr<LegEmitter>> open_can_emitter(const CanEmitterOptions& op
     return tl::unexpected{std::move(socket.error())};
   }
   // It only sends: nothing may pile up in its receive queue.
-  (void)::setsockopt(socket->get(), SOL_CAN_RAW, CAN_RAW_FILTER, nullptr, 0);
+  const can_filter none{};
+  (void)::setsockopt(socket->get(), SOL_CAN_RAW, CAN_RAW_FILTER, &none, 0);
   return std::make_unique<CanEmitter>(*std::move(dictionary), options.fd, *std::move(socket),
                                       options.interface);
 }

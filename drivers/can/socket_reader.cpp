@@ -1,6 +1,5 @@
 #include "can/socket_reader.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
@@ -9,7 +8,6 @@
 #include <ctime>
 #include <optional>
 #include <span>
-#include <string>
 #include <system_error>
 #include <vector>
 

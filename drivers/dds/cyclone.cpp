@@ -6,8 +6,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
-#include <vector>
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
@@ -26,7 +26,7 @@
 #include "dds/low_state.hpp"
 
 // Made by idlc from LowState.idl; its header would drag C into the includes of this part.
-// NOLINTNEXTLINE(readability-identifier-naming): the name that idlc gives it
+// NOLINTNEXTLINE(readability-identifier-naming,bugprone-reserved-identifier): as idlc names it
 extern "C" const dds_topic_descriptor_t unitree_go_msg_dds__LowState__desc;
 
 namespace geoflow::drivers::dds {

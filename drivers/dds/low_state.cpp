@@ -63,12 +63,13 @@ static_assert(sizeof(LowState) == kMemoryBytes && alignof(LowState) == sizeof(st
 
 constexpr std::uint32_t kPolynomial = 0x04C11DB7;
 constexpr std::size_t kTableSize = 256;
+constexpr unsigned kTopByte = 24;  // its place in the register, in bits
 
 /// What one byte in the top of the register does to it.
 constexpr std::array<std::uint32_t, kTableSize> make_table() {
   std::array<std::uint32_t, kTableSize> table{};
   for (std::size_t byte = 0; byte < kTableSize; ++byte) {
-    auto value = static_cast<std::uint32_t>(byte << 24U);
+    auto value = static_cast<std::uint32_t>(byte << kTopByte);
     for (int bit = 0; bit < 8; ++bit) {
       value = value << 1U ^ ((value >> 31U) != 0 ? kPolynomial : 0U);
     }
@@ -117,7 +118,7 @@ std::uint32_t checksum(const LowState& state) {
   for (std::size_t word = 0; word < end; word += sizeof(std::uint32_t)) {
     for (std::size_t i = sizeof(std::uint32_t); i > 0; --i) {  // words from their top byte on
       const auto byte = std::to_integer<std::uint32_t>(image[word + i - 1]);
-      crc = crc << 8U ^ kTable[(crc >> 24U ^ byte) & 0xFFU];
+      crc = crc << 8U ^ kTable[crc >> kTopByte ^ byte];
     }
   }
   return crc;
