@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/data.hpp"
+
 #include "d435i/bytes.hpp"
 #include "d435i/golden.hpp"
 #include "d435i/uvc/payload.hpp"
@@ -24,8 +26,6 @@ namespace fs = std::filesystem;
 class SysfsTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path{testing::TempDir()} / "geoflow-sysfs";
-    fs::remove_all(root_);
     add_device("2-1", "0b3a", "850123050307", "5000", "5");
     add_device("1-4", "0825", "webcam", "480", "2");
     add_video("1-4", "1-4:1.0", 0);
@@ -37,8 +37,6 @@ class SysfsTest : public testing::Test {
     add_iio("2-1", "2-1:1.5/0003:8086:0B3A.0001/HID-SENSOR-200073.1.auto", 0, "accel_3d");
     add_iio("2-1", "2-1:1.5/0003:8086:0B3A.0001/HID-SENSOR-200076.2.auto", 3, "gyro_3d");
   }
-  void TearDown() override { fs::remove_all(root_); }
-
   static void write(const fs::path& path, std::string_view text) {
     fs::create_directories(path.parent_path());
     std::ofstream{path} << text << '\n';
@@ -73,7 +71,8 @@ class SysfsTest : public testing::Test {
     link(fs::path{"bus/iio/devices"} / file, device(place) / below / file);
   }
 
-  fs::path root_;
+  geoflow::tests::TemporaryDirectory folder_;
+  fs::path root_ = folder_.path();
 };
 
 TEST_F(SysfsTest, FindsTheCamerasNodesByTopology) {
