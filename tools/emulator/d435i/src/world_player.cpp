@@ -34,6 +34,9 @@ std::optional<WorldSample> WorldPlayer::next(HostTime now) {
   if (next_due() > now) {
     return std::nullopt;
   }
+  if (ahead_->resumes) {
+    start_ = now - ahead_->t_sent;
+  }
   return std::exchange(ahead_, std::nullopt);
 }
 

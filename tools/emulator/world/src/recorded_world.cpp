@@ -121,6 +121,7 @@ void RecordedWorld::close() noexcept {
 WorldSample RecordedWorld::on_our_time_line(WorldSample sample) {
   if (!origin_) {
     origin_ = sample.t_sent - round_start_;
+    sample.resumes = round_start_ > Duration::zero();
   }
   sample.t -= *origin_;
   sample.t_sent -= *origin_;

@@ -16,6 +16,9 @@ struct WorldSample {
   Duration
       t_sent{};  ///< when the camera has it ready to send; never decreases from sample to sample
   std::variant<ColorFrame, DepthFrame, ImuSample> sample{};
+  /// The world took its time before this one (to begin again): it is not late, but all that follows
+  /// is later.
+  bool resumes = false;
 };
 
 /// What there is before the emulated camera. Thread-bound.
