@@ -18,6 +18,7 @@
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include "pipeline/estimation.hpp"
+#include "pipeline/propagation.hpp"
 #include "pipeline/started_ports.hpp"
 
 namespace geoflow::daemon {
@@ -26,8 +27,9 @@ namespace {
 /// Hands every sample straight on.
 class DirectReceiver final : public SampleReceiver {
  public:
-  DirectReceiver(timesync::Synchroniser& synchroniser, RunCounters& counters)
-      : synchroniser_{synchroniser}, counters_{counters} {}
+  DirectReceiver(timesync::Synchroniser& synchroniser, Propagation& propagation,
+                 RunCounters& counters)
+      : synchroniser_{synchroniser}, propagation_{propagation}, counters_{counters} {}
 
   void on_color(const Arrival<CameraClock, ColorFrame>& frame) override {
     counters_.color_frames.fetch_add(1, std::memory_order_relaxed);
@@ -38,28 +40,34 @@ class DirectReceiver final : public SampleReceiver {
     synchroniser_.push_depth(frame);
   }
   void on_imu(const Arrival<ImuClock, ImuSample>& sample) override {
-    synchroniser_.push_imu(sample);
+    propagation_.push(synchroniser_, sample);
   }
   void on_legs(const Arrival<LegClock, LegSample>& sample) override {
-    synchroniser_.push_legs(sample);
+    propagation_.push(synchroniser_, sample);
   }
   void on_body_velocity(const Arrival<LegClock, BodyVelocitySample>& sample) override {
-    synchroniser_.push_body_velocity(sample);
+    propagation_.push(synchroniser_, sample);
   }
 
  private:
   timesync::Synchroniser& synchroniser_;
+  Propagation& propagation_;
   RunCounters& counters_;
 };
 
 }  // namespace
 
-LockStepRunner::LockStepRunner(Run& run, const Config& config, EstimateHandler handler)
-    : run_{run}, config_{config}, handler_{std::move(handler)} {}
+LockStepRunner::LockStepRunner(Run& run, const Config& config, EstimateHandler handler,
+                               PropagatedHandler on_propagated)
+    : run_{run},
+      config_{config},
+      handler_{std::move(handler)},
+      on_propagated_{std::move(on_propagated)} {}
 
 Result<void> LockStepRunner::run(const std::stop_token& stop) {
   timesync::Synchroniser synchroniser{config_.synchroniser, synchroniser_streams(run_)};
-  DirectReceiver receiver{synchroniser, run_.statistics->counters};
+  Propagation propagation{run_.propagator.get(), on_propagated_};
+  DirectReceiver receiver{synchroniser, propagation, run_.statistics->counters};
   StartedPorts ports{run_.ports()};
   auto started = ports.start(receiver);
   if (!started) {
@@ -75,7 +83,7 @@ Result<void> LockStepRunner::run(const std::stop_token& stop) {
     }
     more = *stepped;
     while (const auto packet = synchroniser.pop(run_.streams->now())) {
-      estimate(*packet);
+      propagation.correct(estimate(*packet));
     }
   }
   while (!more) {
@@ -83,13 +91,13 @@ Result<void> LockStepRunner::run(const std::stop_token& stop) {
     if (!packet) {
       break;
     }
-    estimate(*packet);
+    (void)estimate(*packet);
   }
   run_.synchroniser = synchroniser.counters();
   return {};
 }
 
-void LockStepRunner::estimate(const SyncedPacket& packet) {
+PoseEstimate LockStepRunner::estimate(const SyncedPacket& packet) {
   RunCounters& counters = run_.statistics->counters;
   counters.packets.fetch_add(1, std::memory_order_relaxed);
   const PoseEstimate estimate = process_packet(run_, packet);
@@ -98,6 +106,7 @@ void LockStepRunner::estimate(const SyncedPacket& packet) {
     run_.core->apply(slam::optimise(*task, &run_.statistics->mapping));
     counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
   }
+  return estimate;
 }
 
 }  // namespace geoflow::daemon

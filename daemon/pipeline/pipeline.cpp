@@ -25,10 +25,12 @@
 #include "geoflow/slam/mapping.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 #include "geoflow/timesync/drop_oldest_ring.hpp"
+#include "geoflow/timesync/latest.hpp"
 #include "geoflow/timesync/spsc_ring.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include "pipeline/estimation.hpp"
+#include "pipeline/propagation.hpp"
 #include "pipeline/sample_queues.hpp"
 #include "pipeline/started_ports.hpp"
 
@@ -60,14 +62,14 @@ struct Bells {
 
 class Pipeline::Implementation {
  public:
-  Implementation(Run& run, const Config& config, EstimateHandler on_estimate,
-                 std::function<void()> on_end, Bells bells)
+  Implementation(Run& run, const Config& config, PipelineHandlers handlers, Bells bells)
       : run_{run},
-        on_estimate_{std::move(on_estimate)},
-        on_end_{std::move(on_end)},
+        on_estimate_{std::move(handlers.on_estimate)},
+        on_end_{std::move(handlers.on_end)},
         bells_{std::move(bells)},
         queues_{config.pipeline, run.statistics->counters, bells_.sync},
         synchroniser_{config.synchroniser, synchroniser_streams(run)},
+        propagation_{run.propagator.get(), measured(std::move(handlers.on_propagated))},
         packets_{static_cast<std::size_t>(config.pipeline.packet_queue)},
         ports_{run.ports()} {}
   Implementation(const Implementation&) = delete;
@@ -100,6 +102,17 @@ class Pipeline::Implementation {
   }
 
  private:
+  /// Measures how long a sample's pose took.
+  [[nodiscard]] PropagatedHandler measured(PropagatedHandler handler) const {
+    if (!handler) {
+      return {};
+    }
+    return [this, handler = std::move(handler)](const PropagatedPose& pose) {
+      handler(pose);
+      run_.statistics->propagation.add(HostClock::now() - pose.t_arrival);
+    };
+  }
+
   using Body = void (Implementation::*)(const std::stop_token&);
 
   /// A named thread; its stop token stops `bell` as well.
@@ -130,7 +143,10 @@ class Pipeline::Implementation {
     bool done = false;
     while (!done && wake != Doorbell::Wake::kStopped) {
       done = source_done_.load(std::memory_order_acquire);
-      queues_.drain(synchroniser_);
+      if (const auto frame = frames_.take_new()) {
+        propagation_.correct(*frame);
+      }
+      queues_.drain(synchroniser_, propagation_);
       const HostTime now = HostClock::now();
       while (auto packet = synchroniser_.pop(now)) {
         forward(std::move(*packet));
@@ -182,6 +198,7 @@ class Pipeline::Implementation {
     take_over_mapping();
     const PoseEstimate estimate = process_packet(run_, packet);
     on_estimate_(packet, estimate);
+    frames_.store(estimate);
     run_.statistics->delivery.add(HostClock::now() - packet.t_arrival);
     run_.core->extend_map();
     if (!mapping_) {
@@ -230,6 +247,8 @@ class Pipeline::Implementation {
   Bells bells_;
   SampleQueues queues_;
   timesync::Synchroniser synchroniser_;                 // sync
+  Propagation propagation_;                             // sync
+  timesync::Latest<PoseEstimate> frames_;               // slam -> sync
   timesync::DropOldestRing<SyncedPacket> packets_;      // sync -> slam
   timesync::SpscRing<slam::MappingTask> tasks_{1};      // slam -> map
   timesync::SpscRing<slam::MappingResult> results_{1};  // map -> slam
@@ -248,14 +267,13 @@ Pipeline::Pipeline(std::unique_ptr<Implementation> implementation)
 Pipeline::~Pipeline() = default;
 
 Result<std::unique_ptr<Pipeline>> Pipeline::start(Run& run, const Config& config,
-                                                  EstimateHandler on_estimate,
-                                                  std::function<void()> on_end) {
+                                                  PipelineHandlers handlers) {
   auto bells = Bells::create();
   if (!bells) {
     return tl::unexpected{std::move(bells.error())};
   }
-  auto implementation = std::make_unique<Implementation>(run, config, std::move(on_estimate),
-                                                         std::move(on_end), std::move(*bells));
+  auto implementation =
+      std::make_unique<Implementation>(run, config, std::move(handlers), std::move(*bells));
   auto started = implementation->start();
   if (!started) {
     return tl::unexpected{std::move(started.error())};

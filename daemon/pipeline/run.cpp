@@ -19,6 +19,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/slam/core.hpp"
+#include "geoflow/slam/propagator.hpp"
 #include "geoflow/slam/saved_map.hpp"
 
 namespace geoflow::daemon {
@@ -151,6 +152,9 @@ Result<Run> open_run(const Config& config) {
     return tl::unexpected{std::move(core.error())};
   }
   run.core = std::move(*core);
+  if (run.streams->imu() != nullptr) {
+    run.propagator = slam::Propagator::create(run.streams->calibration(), config.slam.switches);
+  }
   return run;
 }
 

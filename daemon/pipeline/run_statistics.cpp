@@ -79,7 +79,8 @@ json to_json(const RunStatistics& statistics) {
     by_status[to_string(static_cast<TrackingStatus>(i))] = counters.by_status[i].load();
   }
   json times = {{"process", to_json(statistics.process.summary())},
-                {"arrival_to_pose", to_json(statistics.delivery.summary())}};
+                {"arrival_to_pose", to_json(statistics.delivery.summary())},
+                {"imu_to_pose", to_json(statistics.propagation.summary())}};
   for (std::size_t i = 0; i < slam::kStageCount; ++i) {
     const auto stage = static_cast<slam::Stage>(i);
     const StageTimer& timer =

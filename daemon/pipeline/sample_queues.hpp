@@ -12,6 +12,7 @@
 #include "geoflow/timesync/spsc_ring.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 
+#include "pipeline/propagation.hpp"
 #include "pipeline/started_ports.hpp"
 
 namespace geoflow::daemon {
@@ -45,17 +46,17 @@ class SampleQueues final : public SampleReceiver {
     push(body_velocity_, sample);
   }
 
-  /// Moves all that has come into the synchroniser; images last, so that what belongs to them is
-  /// there.
-  void drain(timesync::Synchroniser& synchroniser) {
-    while (const auto sample = imu_.try_pop()) {
-      synchroniser.push_imu(*sample);
-    }
+  /// Moves all that has come into the synchroniser, legs before the IMU, which asks for a pose;
+  /// images last, so that what belongs to them is there.
+  void drain(timesync::Synchroniser& synchroniser, Propagation& propagation) {
     while (const auto sample = legs_.try_pop()) {
-      synchroniser.push_legs(*sample);
+      propagation.push(synchroniser, *sample);
     }
     while (const auto sample = body_velocity_.try_pop()) {
-      synchroniser.push_body_velocity(*sample);
+      propagation.push(synchroniser, *sample);
+    }
+    while (const auto sample = imu_.try_pop()) {
+      propagation.push(synchroniser, *sample);
     }
     while (const auto frame = depth_.try_pop()) {
       synchroniser.push_depth(*frame);

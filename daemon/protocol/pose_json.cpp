@@ -71,7 +71,9 @@ nlohmann::json pose_to_json(const geoflow_pose& pose) {
           {"visual_inliers", pose.visual_inliers},
           {"depth_inliers", pose.depth_inliers},
           {"sensors", sensors(pose.sensors)},
-          {"frames_dropped", pose.frames_dropped}};
+          {"frames_dropped", pose.frames_dropped},
+          {"t_frame_ns", pose.t_frame_ns},
+          {"propagated", is_propagated(pose)}};
 }
 
 }  // namespace geoflow::daemon

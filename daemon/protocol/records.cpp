@@ -16,6 +16,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
@@ -65,6 +66,33 @@ std::int64_t nanoseconds(HostTime t) {
   return t.time_since_epoch().count();
 }
 
+/// What does not depend on what the estimate was made from.
+geoflow_pose pose_of(const PoseEstimate& estimate, const PoseContext& context) {
+  geoflow_pose pose{};
+  pose.t_capture_ns = nanoseconds(estimate.t);
+  pose.t_publish_ns = nanoseconds(context.t_publish);
+  pose.t_recording_ns = nanoseconds(context.t_recording);
+  pose.realtime_minus_mono_ns = realtime_minus_monotonic().count();
+  const Matrix3d R_odom_base = estimate.T_odom_base.rotation_matrix();
+  write_vector(&pose.p_odom_base[0], estimate.T_odom_base.translation());
+  write_quaternion(&pose.q_odom_base[0], estimate.T_odom_base.rotation());
+  write_vector(&pose.p_map_odom[0], estimate.T_map_odom.translation());
+  write_quaternion(&pose.q_map_odom[0], estimate.T_map_odom.rotation());
+  write_vector(&pose.v_base[0], R_odom_base.transpose() * estimate.v_odom_base);
+  write_vector(&pose.w_base[0], estimate.w_base);
+  write_covariance(&pose.covariance[0], odometry_covariance(estimate.covariance, R_odom_base));
+  pose.status = static_cast<std::uint8_t>(estimate.status);
+  pose.source = static_cast<std::uint8_t>(estimate.source);
+  pose.quality = estimate.quality;
+  pose.clock_flags = context.clock_flags;
+  pose.reset_counter = context.earlier_resets + estimate.reset_counter;
+  pose.map_id = estimate.map_id;
+  pose.visual_inliers = estimate.visual_inliers;
+  pose.depth_inliers = estimate.depth_inliers;
+  pose.frames_dropped = static_cast<std::uint32_t>(context.frames_dropped);
+  return pose;
+}
+
 }  // namespace
 
 Result<RecordView> parse_record(std::span<const std::byte> bytes) {
@@ -105,7 +133,8 @@ tl::expected<Hello, Refusal> parse_hello(std::span<const std::byte> bytes) {
   }
   return Hello{.name = printable({&hello.name[0], sizeof hello.name}),
                .max_rate_hz = hello.max_rate_hz,
-               .wants_pose = (hello.want & GEOFLOW_WANT_POSE) != 0};
+               .wants_pose = (hello.want & GEOFLOW_WANT_POSE) != 0,
+               .wants_propagated = (hello.want & GEOFLOW_WANT_PROPAGATED) != 0};
 }
 
 std::vector<std::byte> encode_record(geoflow_record_type type, std::uint32_t dropped,
@@ -132,32 +161,25 @@ Matrix6d odometry_covariance(const Matrix6d& covariance, const Matrix3d& R_odom_
 
 geoflow_pose make_pose(const SyncedPacket& packet, const PoseEstimate& estimate,
                        const PoseContext& context) {
-  geoflow_pose pose{};
-  pose.t_capture_ns = nanoseconds(estimate.t);
+  geoflow_pose pose = pose_of(estimate, context);
   pose.t_arrival_ns = nanoseconds(packet.t_arrival);
-  pose.t_publish_ns = nanoseconds(context.t_publish);
-  pose.t_recording_ns = nanoseconds(context.t_recording);
-  pose.realtime_minus_mono_ns = realtime_minus_monotonic().count();
+  pose.t_frame_ns = pose.t_capture_ns;
   pose.sync_error_bound_ns = packet.error_bound.count();
   pose.frame = packet.sequence;
-  const Matrix3d R_odom_base = estimate.T_odom_base.rotation_matrix();
-  write_vector(&pose.p_odom_base[0], estimate.T_odom_base.translation());
-  write_quaternion(&pose.q_odom_base[0], estimate.T_odom_base.rotation());
-  write_vector(&pose.p_map_odom[0], estimate.T_map_odom.translation());
-  write_quaternion(&pose.q_map_odom[0], estimate.T_map_odom.rotation());
-  write_vector(&pose.v_base[0], R_odom_base.transpose() * estimate.v_odom_base);
-  write_vector(&pose.w_base[0], estimate.w_base);
-  write_covariance(&pose.covariance[0], odometry_covariance(estimate.covariance, R_odom_base));
-  pose.status = static_cast<std::uint8_t>(estimate.status);
-  pose.source = static_cast<std::uint8_t>(estimate.source);
-  pose.quality = estimate.quality;
-  pose.clock_flags = context.clock_flags;
-  pose.reset_counter = context.earlier_resets + estimate.reset_counter;
-  pose.map_id = estimate.map_id;
-  pose.visual_inliers = estimate.visual_inliers;
-  pose.depth_inliers = estimate.depth_inliers;
   pose.sensors = sensors_of(packet);
-  pose.frames_dropped = static_cast<std::uint32_t>(context.frames_dropped);
+  return pose;
+}
+
+geoflow_pose make_pose(const PropagatedPose& propagated, const PoseContext& context) {
+  geoflow_pose pose = pose_of(propagated.estimate, context);
+  pose.t_arrival_ns = nanoseconds(propagated.t_arrival);
+  pose.t_frame_ns = nanoseconds(propagated.t_frame);
+  pose.sync_error_bound_ns = propagated.error_bound.count();
+  pose.frame = propagated.estimate.sequence;
+  pose.sensors = GEOFLOW_SENSOR_IMU;
+  if (propagated.estimate.source == PoseSource::kLegs) {
+    pose.sensors |= GEOFLOW_SENSOR_LEGS;
+  }
   return pose;
 }
 

@@ -1,5 +1,6 @@
 #include "server/pose_connection.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -64,6 +65,7 @@ PoseConnection::Outcome PoseConnection::greet(std::span<const std::byte> datagra
   }
   name_ = std::move(hello->name);
   wants_pose_ = hello->wants_pose;
+  wants_propagated_ = hello->wants_propagated;
   rate_ = RateLimit{hello->max_rate_hz};
   geoflow_welcome reply = welcome;
   reply.client_id = id_;
@@ -86,9 +88,10 @@ void PoseConnection::refuse(geoflow_refusal reason, const std::string& text) {
 }
 
 PoseConnection::Outcome PoseConnection::offer(const geoflow_pose& pose, HostTime now) {
-  if (!welcomed_ || !wants_pose_ || ending_ || !rate_.due(now)) {
+  if (!welcomed_ || !wants(pose) || ending_ || !rate_.due(now)) {
     return Outcome::kOpen;
   }
+  newest_capture_ns_ = std::max(newest_capture_ns_, pose.t_capture_ns);
   if (pending_) {
     ++dropped_;
     ++dropped_since_last_;
@@ -101,6 +104,13 @@ PoseConnection::Outcome PoseConnection::offer(const geoflow_pose& pose, HostTime
     waiting_since_ = now;
   }
   return result == Sent::kBroken ? Outcome::kLost : Outcome::kOpen;
+}
+
+bool PoseConnection::wants(const geoflow_pose& pose) const noexcept {
+  if (is_propagated(pose)) {
+    return wants_propagated_;
+  }
+  return wants_pose_ || (wants_propagated_ && pose.t_capture_ns > newest_capture_ns_);
 }
 
 PoseConnection::Outcome PoseConnection::flush(HostTime now) {

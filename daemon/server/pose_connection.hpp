@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,8 +29,8 @@ class PoseConnection {
 
   /// Takes the next datagrams of the client, the HELLO among them.
   [[nodiscard]] Outcome receive(const geoflow_welcome& welcome, HostTime now);
-  /// Sends the pose, or keeps it as the one that waits (in the place of an older one, which counts
-  /// as dropped).
+  /// Sends the pose, if it is of a kind that the client wants, or keeps it as the one that waits
+  /// (in the place of an older one, which counts as dropped).
   [[nodiscard]] Outcome offer(const geoflow_pose& pose, HostTime now);
   /// Sends what waits. To be called when the socket is writable again.
   [[nodiscard]] Outcome flush(HostTime now);
@@ -54,6 +55,7 @@ class PoseConnection {
 
  private:
   enum class Sent : std::uint8_t { kYes, kFull, kBroken };
+  [[nodiscard]] bool wants(const geoflow_pose& pose) const noexcept;
   [[nodiscard]] Outcome greet(std::span<const std::byte> datagram, const geoflow_welcome& welcome);
   [[nodiscard]] Sent send(std::span<const std::byte> record);
   [[nodiscard]] Sent send_pose(const geoflow_pose& pose);
@@ -64,6 +66,8 @@ class PoseConnection {
   std::string name_;
   bool welcomed_ = false;
   bool wants_pose_ = false;
+  bool wants_propagated_ = false;
+  std::int64_t newest_capture_ns_ = std::numeric_limits<std::int64_t>::min();  ///< offered
   RateLimit rate_{0};
   TokenBucket requests_;
   std::optional<geoflow_pose> pending_;

@@ -145,7 +145,9 @@ void PoseServer::close(int fd, std::string_view why) {
 }
 
 void PoseServer::publish(const geoflow_pose& pose) {
-  newest_ = pose;
+  if (!is_propagated(pose)) {
+    newest_ = pose;
+  }
   const HostTime now = HostClock::now();
   std::vector<int> lost;
   for (const auto& [fd, client] : clients_) {

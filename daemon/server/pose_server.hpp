@@ -33,7 +33,8 @@ class PoseServer {
   PoseServer& operator=(const PoseServer&) = delete;
   ~PoseServer();
 
-  /// Sends a pose; a client that comes later is greeted with the newest one.
+  /// Sends a pose to those who want its kind; a client that comes later is greeted with the newest
+  /// of a frame.
   void publish(const geoflow_pose& pose);
   /// Tells every client that nothing more follows, after what waits for it, and closes it.
   void finish(geoflow_end_reason reason);

@@ -91,6 +91,9 @@ class Daemon {
       resets_ = pose->reset_counter;
       publish(*pose);
     }
+    if (const auto pose = worker_->take_propagated(); pose && poses_) {
+      poses_->publish(*pose);
+    }
     if (ended && !leaving_) {
       config_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
     }

@@ -102,7 +102,7 @@ Result<PoseClient> PoseClient::connect(const std::filesystem::path& socket,
   geoflow_hello hello{};
   hello.client_major = GEOFLOW_PROTOCOL_MAJOR;
   hello.client_minor = GEOFLOW_PROTOCOL_MINOR;
-  hello.want = GEOFLOW_WANT_POSE;
+  hello.want = options.propagated ? GEOFLOW_WANT_PROPAGATED : GEOFLOW_WANT_POSE;
   hello.max_rate_hz = options.max_rate_hz;
   copy_text(hello.name, options.name);
   const std::vector<std::byte> bytes = encode_record(GEOFLOW_HELLO, 0, 0, hello);

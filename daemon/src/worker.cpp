@@ -84,17 +84,23 @@ Result<void> Worker::launch() {
                                              const PoseEstimate& estimate) {
     publish(packet, estimate);
   };
+  const PropagatedHandler on_propagated = [this](const PropagatedPose& pose) {
+    propagated_.store(make_pose(pose, context(pose.estimate.t)));
+    bell_.ring();
+  };
   if (config_.source.realtime) {
-    auto pipeline = Pipeline::start(run_, config_, on_estimate, [this] { end(); });
+    auto pipeline = Pipeline::start(
+        run_, config_,
+        {.on_estimate = on_estimate, .on_end = [this] { end(); }, .on_propagated = on_propagated});
     if (!pipeline) {
       return tl::unexpected{std::move(pipeline.error())};
     }
     pipeline_ = std::move(*pipeline);
     return {};
   }
-  lock_step_ = std::jthread{[this, on_estimate](const std::stop_token& stop) {
+  lock_step_ = std::jthread{[this, on_estimate, on_propagated](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "slam");
-    const auto done = LockStepRunner{run_, config_, on_estimate}.run(stop);
+    const auto done = LockStepRunner{run_, config_, on_estimate, on_propagated}.run(stop);
     if (!done) {
       log::error("replay", "{}", done.error().message);
     }
@@ -106,16 +112,18 @@ Result<void> Worker::launch() {
 }
 
 void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
-  const RunCounters& counters = run_.statistics->counters;
-  const PoseContext context{
-      .t_publish = HostClock::now(),
-      .t_recording = run_.streams->to_recording_time(estimate.t),
-      .clock_flags = clock_flags(config_.source),
-      .earlier_resets = earlier_resets_,
-      .frames_dropped = counters.color_dropped.load(std::memory_order_relaxed) +
-                        counters.packets_dropped.load(std::memory_order_relaxed)};
-  newest_.store(make_pose(packet, estimate, context));
+  newest_.store(make_pose(packet, estimate, context(estimate.t)));
   bell_.ring();
+}
+
+PoseContext Worker::context(HostTime t) const {
+  const RunCounters& counters = run_.statistics->counters;
+  return {.t_publish = HostClock::now(),
+          .t_recording = run_.streams->to_recording_time(t),
+          .clock_flags = clock_flags(config_.source),
+          .earlier_resets = earlier_resets_,
+          .frames_dropped = counters.color_dropped.load(std::memory_order_relaxed) +
+                            counters.packets_dropped.load(std::memory_order_relaxed)};
 }
 
 void Worker::end() {

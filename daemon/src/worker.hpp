@@ -11,10 +11,12 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/pipeline.hpp"
+#include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 #include "geoflow/timesync/latest.hpp"
 
@@ -36,6 +38,8 @@ class Worker {
 
   /// The newest pose, once.
   [[nodiscard]] std::optional<geoflow_pose> take_pose() { return newest_.take_new(); }
+  /// The newest that was carried on to an IMU sample, once.
+  [[nodiscard]] std::optional<geoflow_pose> take_propagated() { return propagated_.take_new(); }
   /// True when the source has ended; the last pose can then be taken.
   [[nodiscard]] bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
   /// Ends all its threads and, the first time, saves the configured map.
@@ -51,6 +55,7 @@ class Worker {
   Worker(const Config& config, timesync::Doorbell& bell, std::uint32_t earlier_resets, Run run);
   [[nodiscard]] Result<void> launch();
   void publish(const SyncedPacket& packet, const PoseEstimate& estimate);
+  [[nodiscard]] PoseContext context(HostTime t) const;
   void end();
   void save_map();
 
@@ -58,7 +63,8 @@ class Worker {
   timesync::Doorbell& bell_;
   std::uint32_t earlier_resets_;
   Run run_;
-  timesync::Latest<geoflow_pose> newest_;  // from the estimating thread to the loop's
+  timesync::Latest<geoflow_pose> newest_;      // from the estimating thread to the loop's
+  timesync::Latest<geoflow_pose> propagated_;  // from the synchronising thread to the loop's
   std::atomic<bool> ended_{false};
   std::unique_ptr<Pipeline> pipeline_;
   std::jthread lock_step_;

@@ -62,4 +62,14 @@ struct LegConfig {
 
 // NOLINTEND(readability-magic-numbers)
 
+/// Of a robot whose IMU's place is known (Calibration::T_cam_imu). Without the camera's place on
+/// the robot, base is the camera, and legs are not to be heard.
+[[nodiscard]] inline LegConfig leg_config_of(const Calibration& calibration) {
+  LegConfig config;
+  const SE3 T_base_cam = calibration.T_base_cam.value_or(SE3{});
+  config.T_base_imu = T_base_cam * calibration.T_cam_imu.value_or(SE3{});
+  config.imu_noise = calibration.imu_noise;
+  return config;
+}
+
 }  // namespace geoflow::slam

@@ -25,13 +25,6 @@ constexpr double kTwistScale = 0.03;
 
 constexpr double kUnknownM = 1;  ///< of a way that is not known
 
-LegConfig leg_config(const Calibration& calibration, const SE3& T_cam_imu) {
-  LegConfig config;
-  config.T_base_imu = calibration.T_base_cam.value_or(SE3{}) * T_cam_imu;
-  config.imu_noise = calibration.imu_noise;
-  return config;
-}
-
 double squared(double x) {
   return x * x;
 }
@@ -53,7 +46,7 @@ DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibrat
       imu_noise_{calibration.imu_noise},
       base_known_{calibration.T_base_cam.has_value()} {
   if (switches.imu && calibration.T_cam_imu) {
-    odometry_.emplace(leg_config(calibration, *calibration.T_cam_imu));
+    odometry_.emplace(leg_config_of(calibration));
   }
 }
 

@@ -96,8 +96,9 @@ TEST_F(PipelineTest, LiveAccountsForEveryFrameAndEndsOnce) {
   std::promise<void> ended;
   std::vector<PoseEstimate> estimates;
   auto pipeline = Pipeline::start(
-      run, config_, [&](const SyncedPacket&, const PoseEstimate& e) { estimates.push_back(e); },
-      [&] { ended.set_value(); });
+      run, config_,
+      {.on_estimate = [&](const SyncedPacket&, const PoseEstimate& e) { estimates.push_back(e); },
+       .on_end = [&] { ended.set_value(); }});
   ASSERT_TRUE(pipeline) << pipeline.error().message;
   ASSERT_EQ(ended.get_future().wait_for(std::chrono::seconds{120}), std::future_status::ready);
   (*pipeline)->stop();
@@ -121,14 +122,15 @@ TEST_F(PipelineTest, LiveStopsAtOnce) {
   auto run = open_run(config_).value();
   std::promise<void> first;
   bool seen = false;
-  auto pipeline = Pipeline::start(
-      run, config_,
-      [&](const SyncedPacket&, const PoseEstimate&) {
-        if (!std::exchange(seen, true)) {
-          first.set_value();
-        }
-      },
-      [] { ADD_FAILURE() << "a stopped pipeline has not ended"; });
+  auto pipeline =
+      Pipeline::start(run, config_,
+                      {.on_estimate =
+                           [&](const SyncedPacket&, const PoseEstimate&) {
+                             if (!std::exchange(seen, true)) {
+                               first.set_value();
+                             }
+                           },
+                       .on_end = [] { ADD_FAILURE() << "a stopped pipeline has not ended"; }});
   ASSERT_TRUE(pipeline);
   ASSERT_EQ(first.get_future().wait_for(std::chrono::seconds{60}), std::future_status::ready);
   (*pipeline)->stop();

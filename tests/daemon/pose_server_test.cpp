@@ -54,6 +54,34 @@ TEST_F(ServerTest, ALateClientIsGreetedWithTheNewestPose) {
   EXPECT_EQ(next(client)->pose.frame, 42U);
 }
 
+TEST_F(ServerTest, PropagatedPosesGoToThoseWhoAskForThem) {
+  auto asks = PoseClient::connect(config_.pose, {.name = "test", .propagated = true});
+  ASSERT_TRUE(asks) << asks.error().message;
+  PoseClient frames_only = connect();
+  const auto publish_at = [&](std::int64_t t_capture_ns, std::int64_t t_frame_ns) {
+    on_loop([&] {
+      geoflow_pose pose{};
+      pose.t_capture_ns = t_capture_ns;
+      pose.t_frame_ns = t_frame_ns;
+      poses_->publish(pose);
+    });
+  };
+  publish_at(10, 10);  // nothing is propagated yet: the frame is the newest there is
+  publish_at(15, 10);
+  publish_at(20, 10);
+  publish_at(13, 13);  // older than what was carried on to 20
+  publish_at(25, 13);
+  publish_at(30, 30);
+  for (const std::int64_t t_capture_ns : {10, 15, 20, 25, 30}) {
+    EXPECT_EQ(next(*asks)->pose.t_capture_ns, t_capture_ns);
+  }
+  for (const std::int64_t t_capture_ns : {10, 13, 30}) {
+    EXPECT_EQ(next(frames_only)->pose.t_capture_ns, t_capture_ns);
+  }
+  PoseClient late = connect();
+  EXPECT_EQ(next(late)->pose.t_capture_ns, 30);
+}
+
 TEST_F(ServerTest, ASlowClientGetsTheNewestPoseAndTheCountOfMissedOnes) {
   config_.stall_timeout = seconds{60};
   PoseClient slow = connect();

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -70,6 +71,18 @@ std::string hexadecimal(std::span<const std::byte> bytes) {
   return text;
 }
 
+/// A record as protocol 1.0 had it: the sender's minor version is 0, and nothing is appended.
+std::string as_version_one_zero(std::span<const std::byte> record, std::size_t payload_bytes) {
+  std::vector<std::byte> bytes{record.begin(), record.end()};
+  bytes.resize(sizeof(geoflow_header) + payload_bytes);
+  auto header = read_payload<geoflow_header>(bytes);
+  EXPECT_EQ(header.minor, GEOFLOW_PROTOCOL_MINOR);
+  header.minor = 0;
+  header.payload_len = static_cast<std::uint32_t>(payload_bytes);
+  std::memcpy(bytes.data(), &header, sizeof header);
+  return hexadecimal(bytes);
+}
+
 // What protocol 1.0 looks like on the wire. These bytes never change: a change of them is a new
 // version.
 TEST(ProtocolOne, GoldenBytesOfHeaderHelloEndAndRefuse) {
@@ -79,18 +92,19 @@ TEST(ProtocolOne, GoldenBytesOfHeaderHelloEndAndRefuse) {
   hello.max_rate_hz = 2.0;
   copy_text(hello.name, "abc");
   EXPECT_EQ(
-      hexadecimal(encode_record(GEOFLOW_HELLO, 0, 0, hello)),
+      as_version_one_zero(encode_record(GEOFLOW_HELLO, 0, 0, hello), sizeof hello),
       "464c4f5701000100300000000000000000000000000000000100000001000000000000000000004061626300"
       "00000000000000000000000000000000000000000000000000000000");
   const geoflow_end end{.reason = GEOFLOW_END_REPLAYED, .reserved = 0};
-  EXPECT_EQ(hexadecimal(encode_record(GEOFLOW_END, 0x01020304, 0x1122334455667788, end)),
+  EXPECT_EQ(as_version_one_zero(encode_record(GEOFLOW_END, 0x01020304, 0x1122334455667788, end),
+                                sizeof end),
             "464c4f5701000500080000000403020188776655443322110200000000000000");
 }
 
 TEST(ProtocolOne, GoldenBytesOfPose) {
   const auto bytes = encode_record(GEOFLOW_POSE, 9, 10, numbered_pose());
-  ASSERT_EQ(bytes.size(), 440U);
-  const std::string text = hexadecimal(bytes);
+  constexpr std::size_t kPayload = 416;
+  const std::string text = as_version_one_zero(bytes, kPayload);
   EXPECT_EQ(text.substr(0, 48), "464c4f5701000400a0010000090000000a00000000000000");
   EXPECT_EQ(text.substr(48, 128),
             "0100000000000000020000000000000003000000000000000400000000000000"
@@ -104,6 +118,27 @@ TEST(ProtocolOne, GoldenBytesOfPose) {
                 sizeof value);
     EXPECT_EQ(value, static_cast<double>(8 + i));
   }
+}
+
+// What 1.1 appends.
+TEST(ProtocolOne, GoldenBytesOfPoseSinceOneOne) {
+  auto pose = numbered_pose();
+  pose.t_frame_ns = 0x0102030405060708;
+  const auto bytes = encode_record(GEOFLOW_POSE, 9, 10, pose);
+  ASSERT_EQ(bytes.size(), 448U);
+  const std::string text = hexadecimal(bytes);
+  EXPECT_EQ(text.substr(0, 48), "464c4f5701010400a8010000090000000a00000000000000");
+  EXPECT_EQ(text.substr(text.size() - 16), "0807060504030201");
+}
+
+TEST(ProtocolOne, APoseIsPropagatedWhereItsFrameIsEarlier) {
+  geoflow_pose pose{};
+  pose.t_capture_ns = 10;
+  EXPECT_FALSE(is_propagated(pose)) << "a daemon of 1.0";
+  pose.t_frame_ns = 10;
+  EXPECT_FALSE(is_propagated(pose));
+  pose.t_frame_ns = 9;
+  EXPECT_TRUE(is_propagated(pose));
 }
 
 TEST(ProtocolOne, ACProgramReadsThePoseWithTheHeaderAlone) {
@@ -144,6 +179,7 @@ TEST(Records, HelloIsJudged) {
   ASSERT_TRUE(good);
   EXPECT_EQ(good->name, "na?me?[31m");
   EXPECT_TRUE(good->wants_pose);
+  EXPECT_FALSE(good->wants_propagated);
   hello.max_rate_hz = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(parse_hello(encode_record(GEOFLOW_HELLO, 0, 0, hello)).error().reason,
             GEOFLOW_REFUSE_MALFORMED);
@@ -154,7 +190,7 @@ TEST(Records, HelloIsJudged) {
   newer[4] = std::byte{2};
   const auto refused = parse_hello(newer);
   EXPECT_EQ(refused.error().reason, GEOFLOW_REFUSE_VERSION);
-  EXPECT_THAT(refused.error().text, HasSubstr("1.0"));
+  EXPECT_THAT(refused.error().text, HasSubstr("1.1"));
 }
 
 TEST(Records, OdometryCovarianceIsThatOfThePoseInOdomAxes) {
@@ -213,6 +249,27 @@ TEST(Records, MakePoseFillsFromPacketAndEstimate) {
   EXPECT_EQ(json["source"], "gicp");
   EXPECT_EQ(json["sensors"], nlohmann::json::array({"imu"}));
   EXPECT_EQ(json["covariance"].size(), 21U);
+}
+
+TEST(Records, MakePoseOfAPropagatedOneNamesItsFrame) {
+  PropagatedPose propagated;
+  propagated.estimate.t = HostTime{Duration{10}};
+  propagated.estimate.sequence = 7;
+  propagated.estimate.source = PoseSource::kLegs;
+  propagated.t_frame = HostTime{Duration{4}};
+  propagated.t_arrival = HostTime{Duration{12}};
+  propagated.error_bound = Duration{3};
+  const auto pose = make_pose(propagated, {.t_publish = HostTime{Duration{14}},
+                                           .t_recording = HostTime{Duration{10}},
+                                           .earlier_resets = 2});
+  EXPECT_EQ(pose.t_capture_ns, 10);
+  EXPECT_EQ(pose.t_frame_ns, 4);
+  EXPECT_EQ(pose.t_arrival_ns, 12);
+  EXPECT_EQ(pose.sync_error_bound_ns, 3);
+  EXPECT_EQ(pose.frame, 7U);
+  EXPECT_EQ(pose.sensors, static_cast<std::uint32_t>(GEOFLOW_SENSOR_IMU | GEOFLOW_SENSOR_LEGS));
+  EXPECT_EQ(pose.reset_counter, 2U);
+  EXPECT_EQ(pose_to_json(pose)["propagated"], true);
 }
 
 TEST(Records, StatusAndSourceNumbersAreThoseOfTheVocabulary) {

@@ -65,11 +65,14 @@ class Script {
       case Act::kDepth:
         return sync.push_depth(spoilt(depth(t_ms, call.delay_ms), call.broken));
       case Act::kImu:
-        return sync.push_imu(spoilt(imu(t_ms, call.delay_ms), call.broken));
+        sync.push_imu(spoilt(imu(t_ms, call.delay_ms), call.broken));
+        return;
       case Act::kLegs:
-        return sync.push_legs(spoilt(legs(t_ms, call.delay_ms), call.broken));
+        sync.push_legs(spoilt(legs(t_ms, call.delay_ms), call.broken));
+        return;
       case Act::kBodyVelocity:
-        return sync.push_body_velocity(spoilt(body_velocity(t_ms, call.delay_ms), call.broken));
+        sync.push_body_velocity(spoilt(body_velocity(t_ms, call.delay_ms), call.broken));
+        return;
       case Act::kPop:
         for (auto& packet : pop_all(sync, now_ms_)) {
           packets.push_back(packet);

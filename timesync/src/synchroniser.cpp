@@ -47,22 +47,27 @@ void Synchroniser::push_depth(const Arrival<CameraClock, DepthFrame>& frame) {
   counters_.camera_clock = camera_clock_.counters();
 }
 
-void Synchroniser::push_imu(const Arrival<ImuClock, ImuSample>& sample) {
+std::optional<Timed<ImuSample>> Synchroniser::push_imu(const Arrival<ImuClock, ImuSample>& sample) {
   note_arrival(sample.t_arrival);
-  imu_.push(sample, imu_clock_, timeshift_cam_imu_, counters_.imu);
+  auto placed = imu_.push(sample, imu_clock_, timeshift_cam_imu_, counters_.imu);
   counters_.imu_clock = imu_clock_.counters();
+  return placed;
 }
 
-void Synchroniser::push_legs(const Arrival<LegClock, LegSample>& sample) {
+std::optional<Timed<LegSample>> Synchroniser::push_legs(
+    const Arrival<LegClock, LegSample>& sample) {
   note_arrival(sample.t_arrival);
-  legs_.push(sample, leg_clock_, Duration::zero(), counters_.legs);
+  auto placed = legs_.push(sample, leg_clock_, Duration::zero(), counters_.legs);
   counters_.leg_clock = leg_clock_.counters();
+  return placed;
 }
 
-void Synchroniser::push_body_velocity(const Arrival<LegClock, BodyVelocitySample>& sample) {
+std::optional<Timed<BodyVelocitySample>> Synchroniser::push_body_velocity(
+    const Arrival<LegClock, BodyVelocitySample>& sample) {
   note_arrival(sample.t_arrival);
-  body_velocity_.push(sample, leg_clock_, Duration::zero(), counters_.body_velocity);
+  auto placed = body_velocity_.push(sample, leg_clock_, Duration::zero(), counters_.body_velocity);
   counters_.leg_clock = leg_clock_.counters();
+  return placed;
 }
 
 std::optional<SyncedPacket> Synchroniser::pop(HostTime now) {

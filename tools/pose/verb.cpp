@@ -40,6 +40,7 @@ using daemon::ReceivedPose;
 
 constexpr auto kWaitSlice = std::chrono::milliseconds{200};
 constexpr double kHighestRateHz = 1000;
+constexpr double kCameraRateHz = 30;  // a D435i's: who asks for more wants the IMU's poses
 constexpr double kMillisecondsPerNanosecond = 1e-6;
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
@@ -48,6 +49,7 @@ constexpr std::string_view kExamples =
     "ends or Ctrl-C\n"
     "  geoflow pose --once --json                the newest pose as one JSON object\n"
     "  geoflow pose --rate 2                     two a second\n"
+    "  geoflow pose --rate 200                   carried on to each IMU sample\n"
     "  geoflow pose --json | jq .p_odom_base     for scripts\n"
     "  geoflow pose --tum live.txt               the poses in the map to a file, for "
     "geoflow "
@@ -111,7 +113,10 @@ class PoseVerb final : public Verb {
 
   void declare(CLI::App& command) override {
     command.add_option("--socket", socket_, "The daemon's pose socket")->capture_default_str();
-    command.add_option("--rate", rate_hz_, "Poses a second at most; 0: every one")
+    command
+        .add_option("--rate", rate_hz_,
+                    "Poses a second at most; 0: every frame's. Above 30, poses at IMU samples, "
+                    "carried on from the newest frame by IMU and legs")
         ->check(CLI::Range(0.0, kHighestRateHz))
         ->capture_default_str();
     command.add_option("--count", count_, "End after so many poses; 0: do not");
@@ -122,7 +127,9 @@ class PoseVerb final : public Verb {
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
-    auto client = PoseClient::connect(socket_, {.name = "geoflow pose", .max_rate_hz = rate_hz_});
+    auto client = PoseClient::connect(
+        socket_,
+        {.name = "geoflow pose", .max_rate_hz = rate_hz_, .propagated = rate_hz_ > kCameraRateHz});
     if (!client) {
       return tl::unexpected{std::move(client.error())};
     }

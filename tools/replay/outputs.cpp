@@ -8,6 +8,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -65,12 +66,14 @@ Result<void> prepare_output(const fs::path& directory) {
 Result<void> write_outputs(const fs::path& directory, const ReplayResult& result,
                            const nlohmann::json& report) {
   const Calibration& calibration = result.run.streams->calibration();
-  // NOLINTNEXTLINE(modernize-avoid-c-arrays): no copies of trajectories
-  const std::pair<const char*, Trajectory> files[] = {
+  std::vector<std::pair<const char*, Trajectory>> files = {
       {"live_base.txt", result.live_base},
       {"live_camera.txt", camera_trajectory(result.live_base, calibration)},
       {"final_base.txt", result.final_base},
       {"final_camera.txt", camera_trajectory(result.final_base, calibration)}};
+  if (!result.imu_base.empty()) {
+    files.emplace_back("live_imu_base.txt", result.imu_base);
+  }
   for (const auto& [name, trajectory] : files) {
     auto written = replace_file(directory / name, [&poses = trajectory](const fs::path& path) {
       return write_tum(path, poses);

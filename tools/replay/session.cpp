@@ -34,7 +34,8 @@ std::uint64_t color_images(const drivers::RecordingInfo& info) {
 
 }  // namespace
 
-Result<ReplayResult> replay(const daemon::Config& config, const ReplayProgress& progress) {
+Result<ReplayResult> replay(const daemon::Config& config, const ReplayProgress& progress,
+                            bool propagate) {
   const HostTime begin = HostClock::now();
   auto opened = daemon::open_run(config);
   if (!opened) {
@@ -58,8 +59,16 @@ Result<ReplayResult> replay(const daemon::Config& config, const ReplayProgress& 
       stop.request_stop();
     }
   };
+  daemon::PropagatedHandler take_propagated;
+  if (propagate) {
+    take_propagated = [&](const daemon::PropagatedPose& propagated) {
+      const PoseEstimate& estimate = propagated.estimate;
+      result.imu_base.push_back({estimate.t, estimate.T_map_odom * estimate.T_odom_base});
+    };
+  }
   const HostTime ready = HostClock::now();
-  auto done = daemon::LockStepRunner{result.run, config, take}.run(stop.get_token());
+  auto done =
+      daemon::LockStepRunner{result.run, config, take, take_propagated}.run(stop.get_token());
   result.elapsed = HostClock::now() - ready;
   if (!done) {
     return tl::unexpected{std::move(done.error())};

@@ -18,6 +18,7 @@ namespace geoflow::tools {
 struct ReplayResult {
   daemon::Run run;
   Trajectory live_base;   ///< T_map_base of each frame as the socket would have said it at its time
+  Trajectory imu_base;    ///< the same at each IMU sample, if asked for
   Trajectory final_base;  ///< after all optimisation
   Duration elapsed{};     ///< from the opened recording to the last estimate
   Duration first_pose{};  ///< from the beginning of the opening to the first estimate
@@ -29,9 +30,9 @@ struct ReplayResult {
 using ReplayProgress = std::function<bool(std::uint64_t frames, std::uint64_t total)>;
 
 /// Replays the configured recording in lock step, with the configured map; one that is refused is
-/// an error. Thread-bound.
+/// an error. `propagate`: with poses at IMU samples. Thread-bound.
 [[nodiscard]] Result<ReplayResult> replay(const daemon::Config& config,
-                                          const ReplayProgress& progress);
+                                          const ReplayProgress& progress, bool propagate = false);
 
 /// The same poses of the camera: each times T_base_cam (nothing to do where the base is the
 /// camera).

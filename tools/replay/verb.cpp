@@ -60,6 +60,9 @@ class ReplayVerb final : public Verb {
     command.add_option("--config", config_file_, "TOML file");
     command.add_option("--faults", faults_, "Script of faults to put on the recording");
     command.add_option("--seed", seed_, "Seed of the script's random choices");
+    command.add_flag("--imu-poses", imu_poses_,
+                     "Also write live_imu_base.txt: base_link at each IMU sample, carried on from "
+                     "the newest frame");
     command.add_option("--load-map", load_map_, "Begin with this map, and find the place in it");
     command.add_option("--save-map", save_map_, "Write the map to this file at the end");
     command
@@ -79,11 +82,12 @@ class ReplayVerb final : public Verb {
       return tl::unexpected{std::move(prepared.error())};
     }
     const HostTime begin = HostClock::now();
-    auto result = replay(*config, [&](std::uint64_t frames, std::uint64_t total) {
+    const auto progress = [&](std::uint64_t frames, std::uint64_t total) {
       const double rate = static_cast<double>(frames) / to_seconds(HostClock::now() - begin);
       console.progress(frames, total, fmt::format("frames, {:.0f} a second", rate));
       return !InterruptScope::requested();
-    });
+    };
+    auto result = replay(*config, progress, imu_poses_);
     if (!result) {
       return tl::unexpected{std::move(result.error())};
     }
@@ -148,6 +152,7 @@ class ReplayVerb final : public Verb {
   std::string load_map_;
   std::string save_map_;
   std::uint64_t seed_ = 0;
+  bool imu_poses_ = false;
   std::vector<std::string> settings_;
 };
 

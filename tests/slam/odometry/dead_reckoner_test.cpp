@@ -1,7 +1,6 @@
 #include "odometry/dead_reckoner.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,24 +15,12 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/config.hpp"
 #include "geoflow/tools/simulator/imu_simulator.hpp"
-#include "geoflow/tools/simulator/leg_simulator.hpp"
-#include "geoflow/tools/simulator/mount.hpp"
-#include "geoflow/tools/simulator/walk.hpp"
 
-#include "simulator/walk_fixture.hpp"
+#include "odometry/simulated_walk.hpp"
 
 /// Dead reckoning from frame to frame on simulated walks, against their exact truth.
 namespace geoflow::slam {
 namespace {
-
-using simulator::tests::walk_for;
-
-constexpr double kWalkS = 20;
-constexpr double kFrameS = 1.0 / 30;
-
-HostTime at(double t_s) {
-  return HostTime{Duration{std::llround(t_s * 1e9)}};
-}
 
 /// The samples of a walk by packet: those in (previous, t] and the next one behind.
 template <typename Sample>
@@ -52,28 +39,9 @@ std::vector<Timed<Sample>> window(const std::vector<Timed<Sample>>& all, HostTim
 }
 
 /// One simulated walk, and what a reckoner makes of it.
-class Walked {
+class Walked : public SimulatedWalk {
  public:
-  explicit Walked(std::uint64_t seed)
-      : walk_{walk_for(kWalkS, {.seed = seed})},
-        T_base_cam_{simulator::go2_T_base_cam()},
-        T_base_imu_{T_base_cam_ * simulator::d435i_T_cam_imu()} {
-    calibration.T_base_cam = T_base_cam_;
-    calibration.T_cam_imu = simulator::d435i_T_cam_imu();
-    for (const auto& r : simulator::ImuSimulator{walk_, T_base_imu_, seed, {}}.readings()) {
-      imu_.push_back({at(r.t_s), {}, r.sample});
-    }
-    const simulator::LegSimulator legs{walk_, seed, {}};
-    for (std::size_t i = 0; i < legs.size(); ++i) {
-      const auto r = legs.reading(i);
-      legs_.push_back({at(r.t_s), {}, r.sample});
-      const auto body = walk_.state(r.t_s).body;
-      twist_.push_back({at(r.t_s),
-                        {},
-                        {.v_base_mps = body.T_world_base.rotation().inverse() * body.v_world_base,
-                         .w_base_radps = body.w_base}});
-    }
-  }
+  using SimulatedWalk::SimulatedWalk;
 
   struct Account {
     int motions = 0;
@@ -83,17 +51,17 @@ class Walked {
     double worst_m = 0;           ///< largest error of translation over a frame
   };
 
-  [[nodiscard]] Account reckon(const Switches& switches, bool legs, bool twist) const {
+  [[nodiscard]] Account reckon(const Switches& switches, bool with_legs, bool with_twist) const {
     DeadReckoner reckoner{switches, calibration};
     Account account;
-    HostTime before = at(0);
+    HostTime before = walk_time(0);
     for (double t_s = kFrameS; t_s < kWalkS - kFrameS; t_s += kFrameS) {
       SyncedPacket packet;
-      packet.t = at(t_s);
-      packet.imu = window(imu_, before, packet.t);
-      packet.legs = legs ? window(legs_, before, packet.t) : std::vector<Timed<LegSample>>{};
-      packet.body_velocity =
-          twist ? window(twist_, before, packet.t) : std::vector<Timed<BodyVelocitySample>>{};
+      packet.t = walk_time(t_s);
+      packet.imu = window(imu, before, packet.t);
+      packet.legs = with_legs ? window(legs, before, packet.t) : std::vector<Timed<LegSample>>{};
+      packet.body_velocity = with_twist ? window(body_velocity, before, packet.t)
+                                        : std::vector<Timed<BodyVelocitySample>>{};
       const auto motion = reckoner.add(packet);
       if (motion) {
         const SE3 truth = T_world_cam(t_s - kFrameS).inverse() * T_world_cam(t_s);
@@ -116,21 +84,6 @@ class Walked {
     account.nees_translation /= std::max(1, account.motions);
     return account;
   }
-
-  Calibration calibration;
-
- private:
-  [[nodiscard]] SE3 T_world_cam(double t_s) const {
-    const SE3 T_world_base = walk_.state(t_s).body.T_world_base;
-    return T_world_base * T_base_cam_;
-  }
-
-  simulator::Walk walk_;
-  SE3 T_base_cam_;
-  SE3 T_base_imu_;
-  std::vector<Timed<ImuSample>> imu_;
-  std::vector<Timed<LegSample>> legs_;
-  std::vector<Timed<BodyVelocitySample>> twist_;
 };
 
 TEST(DeadReckoner, KnowsEachStepOfAWalkByImuAndLegsAndHowWell) {

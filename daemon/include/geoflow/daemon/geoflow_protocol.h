@@ -1,4 +1,4 @@
-/* Records of geoflowd's pose socket, protocol version 1.0. For C11 and C++; needs nothing but this
+/* Records of geoflowd's pose socket, protocol version 1.1. For C11 and C++; needs nothing but this
  * file.
  *
  * Connect to the socket (AF_UNIX, SOCK_SEQPACKET), send one HELLO, receive one WELCOME or REFUSE,
@@ -22,7 +22,7 @@
 
 #define GEOFLOW_MAGIC 0x574F4C46u /* the bytes "FLOW" */
 #define GEOFLOW_PROTOCOL_MAJOR 1u /* grows when a reader of the old version would be wrong */
-#define GEOFLOW_PROTOCOL_MINOR 0u /* grows when fields are appended */
+#define GEOFLOW_PROTOCOL_MINOR 1u /* grows when fields are appended */
 #define GEOFLOW_MAX_RECORD 4096u  /* no record, header included, is larger */
 
 enum geoflow_record_type {
@@ -45,7 +45,11 @@ struct geoflow_header {
   uint64_t sequence; /* counts records sent to this client from 0 */
 };
 
-enum geoflow_want { GEOFLOW_WANT_POSE = 1 };
+enum geoflow_want {
+  GEOFLOW_WANT_POSE = 1,      /* one pose a frame */
+  GEOFLOW_WANT_PROPAGATED = 2 /* since 1.1: one an IMU sample, carried on from the newest frame;
+                                 a frame's own only while it is newer than those */
+};
 
 struct geoflow_hello {
   uint8_t client_major; /* GEOFLOW_PROTOCOL_MAJOR of the client */
@@ -140,6 +144,9 @@ struct geoflow_pose {
   uint32_t depth_inliers;  /* depth points that agree with the pose */
   uint32_t sensors;        /* enum geoflow_sensors, or-ed */
   uint32_t frames_dropped; /* frames that the daemon has dropped so far */
+  /* since 1.1 */
+  int64_t t_frame_ns; /* capture of the frame that the pose goes back to: t_capture_ns, or earlier
+                         where it was propagated from there by IMU and legs; 0: a daemon of 1.0 */
 };
 
 enum geoflow_end_reason {
@@ -160,7 +167,7 @@ GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_welcome) == 96, "welcome");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_welcome, realtime_minus_mono_ns) == 40, "welcome");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_welcome, version) == 64, "welcome");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_refuse) == 128, "refuse");
-GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_pose) == 416, "pose");
+GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_pose) == 424, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, frame) == 48, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, p_odom_base) == 56, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, q_odom_base) == 80, "pose");
@@ -172,6 +179,7 @@ GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, covariance) == 216, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, status) == 384, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, clock_flags) == 388, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, frames_dropped) == 412, "pose");
+GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, t_frame_ns) == 416, "pose");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_end) == 8, "end");
 
 /* NOLINTEND(modernize-*,readability-*) */

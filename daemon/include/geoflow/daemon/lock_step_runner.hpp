@@ -4,7 +4,9 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/synced_packet.hpp"
 
 namespace geoflow::daemon {
 
@@ -14,19 +16,21 @@ namespace geoflow::daemon {
 /// gives the same estimates bit for bit on one machine. Thread-bound.
 class LockStepRunner {
  public:
-  /// `run` and `config` must outlive it.
-  LockStepRunner(Run& run, const Config& config, EstimateHandler handler);
+  /// `run` and `config` must outlive it. Poses are propagated only where `on_propagated` is given.
+  LockStepRunner(Run& run, const Config& config, EstimateHandler handler,
+                 PropagatedHandler on_propagated = {});
 
   /// Runs to the recording's end, or until `stop`; then leaves the estimator as it is. Samples that
   /// cannot be decoded are counted, not fatal. An error only where a port cannot be started.
   [[nodiscard]] Result<void> run(const std::stop_token& stop);
 
  private:
-  void estimate(const SyncedPacket& packet);
+  PoseEstimate estimate(const SyncedPacket& packet);
 
   Run& run_;
   const Config& config_;
   EstimateHandler handler_;
+  PropagatedHandler on_propagated_;
 };
 
 }  // namespace geoflow::daemon

@@ -9,10 +9,18 @@
 
 namespace geoflow::daemon {
 
+/// What is called with what comes out.
+struct PipelineHandlers {
+  EstimateHandler on_estimate;   ///< on slam
+  std::function<void()> on_end;  ///< on slam, once, when the source has ended and its last packet
+                                 ///< is done; not after stop()
+  PropagatedHandler on_propagated{};  ///< on sync; empty: nothing is propagated
+};
+
 /// The live pipeline, on threads of its own:
 ///
 ///     replay  the source; its sinks push to bounded queues and never block
-///     sync    synchroniser: samples -> packets
+///     sync    synchroniser: samples -> packets; carries the newest estimate on to each IMU sample
 ///     slam    Core::process; takes over what mapping found between two packets
 ///     map     local bundle adjustment, one task at a time
 ///
@@ -21,12 +29,10 @@ namespace geoflow::daemon {
 /// mapping task is worked on no other is taken: a keyframe made meanwhile waits for the next.
 class Pipeline {
  public:
-  /// Starts all threads. `on_estimate` is called on slam; `on_end` there too, once, when the source
-  /// has ended and its last packet is done (not after stop()). `run` must outlive the pipeline and
-  /// is its own while it runs; only run.statistics may be read meanwhile.
+  /// Starts all threads. `run` must outlive the pipeline and is its own while it runs; only
+  /// run.statistics may be read meanwhile.
   [[nodiscard]] static Result<std::unique_ptr<Pipeline>> start(Run& run, const Config& config,
-                                                               EstimateHandler on_estimate,
-                                                               std::function<void()> on_end);
+                                                               PipelineHandlers handlers);
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
   ~Pipeline();

@@ -24,8 +24,9 @@ struct ReceivedPose {
 class PoseClient {
  public:
   struct Options {
-    std::string name;        ///< for the daemon's log
-    double max_rate_hz = 0;  ///< 0: every pose
+    std::string name;         ///< for the daemon's log
+    double max_rate_hz = 0;   ///< 0: every pose
+    bool propagated = false;  ///< poses at each IMU sample instead of each frame
   };
 
   /// Connects and shakes hands. kUnavailable where no daemon listens, or it refuses (with its

@@ -14,6 +14,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -50,6 +51,7 @@ struct Hello {
   std::string name;        ///< printable ASCII; everything else is replaced by '?'
   double max_rate_hz = 0;  ///< 0: every pose
   bool wants_pose = false;
+  bool wants_propagated = false;
 };
 
 /// Why a client is not welcome.
@@ -93,6 +95,13 @@ struct PoseContext {
 /// The POSE payload of one packet's estimate. CLOCK_REALTIME's offset is read here.
 [[nodiscard]] geoflow_pose make_pose(const SyncedPacket& packet, const PoseEstimate& estimate,
                                      const PoseContext& context);
+/// Likewise of a pose that was carried on to an IMU sample.
+[[nodiscard]] geoflow_pose make_pose(const PropagatedPose& propagated, const PoseContext& context);
+
+/// Whether a pose was carried on from an earlier frame.
+[[nodiscard]] constexpr bool is_propagated(const geoflow_pose& pose) noexcept {
+  return pose.t_frame_ns != 0 && pose.t_frame_ns < pose.t_capture_ns;
+}
 
 /// The covariance of T_odom_base in nav_msgs' order and frame (x y z rx ry rz, rotation about
 /// odom's axes) from this project's (rotation, translation; right perturbation). First order: both

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
@@ -13,6 +14,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/slam/core.hpp"
+#include "geoflow/slam/propagator.hpp"
 #include "geoflow/timesync/counters.hpp"
 
 namespace geoflow::daemon {
@@ -27,6 +29,9 @@ struct Ports {
   Legs* legs = nullptr;  ///< likewise
 };
 
+/// Gets every propagated pose, on the thread that synchronises. Must not block.
+using PropagatedHandler = std::function<void(const PropagatedPose&)>;
+
 /// One source with one estimator and what is measured of them: what LockStepRunner and Pipeline
 /// work on.
 struct Run {
@@ -36,6 +41,7 @@ struct Run {
   std::shared_ptr<Imu> imu{};    ///< likewise
   std::unique_ptr<RunStatistics> statistics;
   std::unique_ptr<slam::Core> core;
+  std::unique_ptr<slam::Propagator> propagator;  ///< null: no IMU whose place is known
   /// Why the configured map was not taken; none where it was, or none is configured.
   std::optional<Error> map_refused{};
   timesync::SynchroniserCounters synchroniser;  ///< filled when the run is over

@@ -49,10 +49,11 @@ class StageTimer final : public slam::StageObserver {
 /// All that is measured of one run.
 struct RunStatistics {
   RunCounters counters;
-  StageTimer tracking;     ///< stages on the estimator's thread
-  StageTimer mapping;      ///< stages of mapping, on its own thread or in lock step
-  TimeHistogram process;   ///< Core::process, all its stages and what is between them
-  TimeHistogram delivery;  ///< live: from a frame's arrival to its estimate
+  StageTimer tracking;        ///< stages on the estimator's thread
+  StageTimer mapping;         ///< stages of mapping, on its own thread or in lock step
+  TimeHistogram process;      ///< Core::process, all its stages and what is between them
+  TimeHistogram delivery;     ///< live: from a frame's arrival to its estimate
+  TimeHistogram propagation;  ///< live: from an IMU sample's arrival to its pose
 
   /// Frames whose estimate has a pose: TRACKING, DEGRADED or RELOCALISING.
   [[nodiscard]] std::uint64_t frames_with_pose() const noexcept;

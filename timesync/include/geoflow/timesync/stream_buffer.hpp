@@ -33,31 +33,31 @@ class StreamBuffer {
   StreamBuffer(std::size_t capacity, Duration max_step)
       : ring_(capacity < 1 ? 1 : capacity), max_step_{max_step} {}
 
-  /// Takes a sample if it is usable, new and in time.
-  void push(Timed<Sample> timed, HostTime t_arrival, StreamCounters& counters) {
+  /// Takes a sample if it is usable, new and in time; whether it did.
+  bool push(Timed<Sample> timed, HostTime t_arrival, StreamCounters& counters) {
     ++counters.pushed;
     if (!is_plausible_stamp_ns(timed.t.time_since_epoch().count()) || !is_usable(timed.sample)) {
       ++counters.invalid;
-      return;
+      return false;
     }
     const std::size_t place = upper_bound(timed.t);
     if ((place > 0 && (*this)[place - 1].timed.t == timed.t) ||
         (horizon_ && exact_horizon_ && timed.t == *horizon_)) {
       ++counters.duplicate;
-      return;
+      return false;
     }
     if (horizon_ && timed.t <= *horizon_) {
       ++counters.late;
-      return;
+      return false;
     }
     if (is_outlier(timed.t)) {
       ++counters.outlier;
-      return;
+      return false;
     }
     if (size_ == ring_.size()) {
       if (place == 0) {
         ++counters.overflow;  // the new one is the oldest
-        return;
+        return false;
       }
       counters.overflow += front().used ? 0U : 1U;
       drop_front();
@@ -65,6 +65,7 @@ class StreamBuffer {
     } else {
       insert(place, Entry{std::move(timed), t_arrival}, counters);
     }
+    return true;
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }

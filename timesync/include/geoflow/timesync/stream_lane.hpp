@@ -24,14 +24,15 @@ class StreamLane {
   StreamLane(std::size_t capacity, Duration max_step, const Liveness& liveness)
       : buffer{capacity, max_step}, liveness_{liveness} {}
 
-  /// Takes an arrival; `shift` is subtracted from its host time.
+  /// Takes an arrival; `shift` is subtracted from its host time. Where it was placed, if it was
+  /// taken.
   template <typename Clock>
-  void push(const Arrival<Clock, Sample>& arrival, ClockModel<Clock>& clock, Duration shift,
-            StreamCounters& counters) {
+  std::optional<Timed<Sample>> push(const Arrival<Clock, Sample>& arrival, ClockModel<Clock>& clock,
+                                    Duration shift, StreamCounters& counters) {
     if (!is_plausible_stamp_ns(arrival.t_arrival.time_since_epoch().count())) {
       ++counters.pushed;
       ++counters.invalid;
-      return;
+      return std::nullopt;
     }
     liveness_.heard(arrival.t_arrival);
     const auto placed = clock.add(arrival.t_device, arrival.t_arrival);
@@ -39,7 +40,9 @@ class StreamLane {
     if (is_plausible_stamp_ns(stamp.t.time_since_epoch().count())) {
       stamp.t -= shift;
     }
-    buffer.push({stamp.t, stamp.error_bound, arrival.sample}, arrival.t_arrival, counters);
+    const Timed<Sample> timed{stamp.t, stamp.error_bound, arrival.sample};
+    const bool taken = buffer.push(timed, arrival.t_arrival, counters);
+    return taken ? std::optional{timed} : std::nullopt;
   }
 
   /// Whether nothing at or before `t` need be waited for: a sample at or after it came, or the

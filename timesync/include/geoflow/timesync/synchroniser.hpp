@@ -32,9 +32,11 @@ class Synchroniser {
 
   void push_color(const Arrival<CameraClock, ColorFrame>& frame);
   void push_depth(const Arrival<CameraClock, DepthFrame>& frame);
-  void push_imu(const Arrival<ImuClock, ImuSample>& sample);
-  void push_legs(const Arrival<LegClock, LegSample>& sample);
-  void push_body_velocity(const Arrival<LegClock, BodyVelocitySample>& sample);
+  /// These say where on the host's time line the sample was placed, if it was taken.
+  std::optional<Timed<ImuSample>> push_imu(const Arrival<ImuClock, ImuSample>& sample);
+  std::optional<Timed<LegSample>> push_legs(const Arrival<LegClock, LegSample>& sample);
+  std::optional<Timed<BodyVelocitySample>> push_body_velocity(
+      const Arrival<LegClock, BodyVelocitySample>& sample);
 
   /// The next packet that is complete, or whose wait is over at `now`. Call until it gives none.
   [[nodiscard]] std::optional<SyncedPacket> pop(HostTime now);
