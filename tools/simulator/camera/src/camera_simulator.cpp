@@ -238,9 +238,8 @@ struct CameraSimulator::Parts {
   [[nodiscard]] FrameRef measure_depth(double t_s, const PoseAt& T_world_cam,
                                        std::uint64_t key) const {
     const SE3 T_world_ir = T_world_cam(t_s) * registration.T_cam_ir;
-    const InfraredView seen =
-        see_infrared(*rays, shader, registration.depth, T_world_ir, rays->ray_time(t_s),
-                     static_cast<float>(options.projector_power));
+    const InfraredView seen = see_infrared(*rays, shader, registration.depth, T_world_ir, t_s,
+                                           static_cast<float>(options.projector_power));
     const std::vector<float> depth_m = match_stereo(seen, registration.depth, options, key);
     FrameRef depth = FramePool{1}.acquire(
         {.width = options.width, .height = options.height, .format = PixelFormat::kDepth16});

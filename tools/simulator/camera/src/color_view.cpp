@@ -14,6 +14,7 @@
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 
+#include "src/candidates.hpp"
 #include "src/ray_scene.hpp"
 #include "src/sender.hpp"
 #include "src/shader.hpp"
@@ -26,20 +27,15 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// Ends a packet's rays: on what the whole tile sees if that is one thing, or by tracing.
-void end_rays(const Subject& subject, const Tile& tile, int steady, RayPacket& packet) {
-  if (steady >= 0) {
-    const Patch& patch = subject.scene.patches[static_cast<std::size_t>(steady)];
+/// Ends a packet's rays: on what the whole tile sees if that is one patch, or on what it may see.
+void end_rays(const Subject& subject, const Tile& tile, const Candidates& may, RayPacket& packet) {
+  if (may.one_patch()) {
+    const std::uint32_t number = may.patches().front();
+    const Patch& patch = subject.scene.patches[number];
     const Vector3f normal = patch.normal();
-    land(static_cast<unsigned>(steady), normal, normal.dot(patch.origin), packet);
-  } else if (steady == SteadyTiles::kMixed) {
-    subject.rays.trace(tile.valid, packet);
-  }
-}
-
-void add(const LaneColours& light, LaneColours& sum) noexcept {
-  for (std::size_t i = 0; i < kPacket; ++i) {
-    sum[i] += light[i];
+    land(number, normal, normal.dot(patch.origin), packet);
+  } else {
+    subject.rays.trace_among(may, tile.valid, packet);
   }
 }
 
@@ -62,19 +58,22 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
   const Pinhole pinhole{intrinsics};
   const ViewTrack track{shutter.begin_s(), shutter.end_s(), T_world_cam};
   const Sender sender{subject.rays, pinhole, shutter, track, sampling};
-  // To find steady tiles costs a ray a pixel.
+  // To find what tiles may see costs as much as a ray or two a pixel.
   std::optional<SteadyTiles> steady;
   if (!sampling.trace_all && sampling.rays_a_pixel > 2) {
     steady.emplace(subject.rays, pinhole, shutter, intrinsics.width, track);
   }
+  Candidates anything;
+  anything.add_anything();
   const float share = 1.0F / static_cast<float>(sampling.rays_a_pixel);
   const auto width = static_cast<std::size_t>(intrinsics.width);
   std::vector<Rgb> image(width * static_cast<std::size_t>(intrinsics.height));
   for_each_tile_row(intrinsics.width, intrinsics.height, [&](int top) {
     return [&, legs = sender.legs(top)](const Tile& tile) {
-      const int seen = steady ? steady->at(tile) : SteadyTiles::kMixed;
+      const Candidates& may = steady ? steady->candidates(tile) : anything;
       const Sender::PixelBits pixels = sender.pixel_bits(tile);
       LaneColours sum{};
+      Shader::Mirrored mirrored;
       for (int part = 0; part < sampling.rays_a_pixel; ++part) {
         RayPacket packet;
         RayScene::reset(packet);
@@ -86,11 +85,12 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
                                             static_cast<std::uint64_t>(tile.left))};
         sender.aim_tile(tile, pixels, part, legs[static_cast<std::size_t>(part)], packet,
                         look.order);
-        end_rays(subject, tile, seen, packet);
-        LaneColours light{};
-        subject.shader.shade(tile.valid, packet, look, light);
-        add(light, sum);
+        end_rays(subject, tile, may, packet);
+        subject.shader.shade(tile.valid, packet, look, mirrored, sum);
       }
+      subject.shader.add_mirrored(
+          {.footprint_per_t = pinhole.inverse_fx, .rays_a_pixel = sampling.rays_a_pixel}, mirrored,
+          sum);
       put(tile, sum, share, width, image);
     };
   });

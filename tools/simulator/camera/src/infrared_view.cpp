@@ -11,6 +11,7 @@
 
 #include "src/ray_scene.hpp"
 #include "src/shader.hpp"
+#include "src/steady_tiles.hpp"
 #include "src/tiles.hpp"
 #include "src/view.hpp"
 
@@ -45,12 +46,16 @@ float signal_of(const Surfaces& seen, std::size_t lane, float depth_m, float sun
 }  // namespace
 
 InfraredView see_infrared(const RayScene& rays, const Shader& shader,
-                          const CameraIntrinsics& intrinsics, const SE3& T_world_ir, float ray_time,
+                          const CameraIntrinsics& intrinsics, const SE3& T_world_ir, double t_s,
                           float projector_power) {
   const View view{T_world_ir};
   const Pinhole pinhole{intrinsics};
   const auto width = static_cast<std::size_t>(intrinsics.width);
   const float sun_lux = shader.sun_lux();
+  const float ray_time = rays.ray_time(t_s);
+  const SteadyTiles steady{rays, pinhole, Shutter{.t_mid_s = t_s, .rows = intrinsics.height},
+                           intrinsics.width,
+                           ViewTrack{t_s, t_s, [&](double) { return T_world_ir; }}};
   InfraredView seen;
   seen.depth_m.resize(width * static_cast<std::size_t>(intrinsics.height));
   seen.signal.resize(seen.depth_m.size());
@@ -63,7 +68,7 @@ InfraredView see_infrared(const RayScene& rays, const Shader& shader,
       aim(packet, i, view.p_world_cam, view.R_world_cam * local);
       packet.ray.time[i] = ray_time;
     }
-    rays.trace(tile.valid, packet);
+    rays.trace_among(steady.candidates(tile), tile.valid, packet);
     const Surfaces surfaces = shader.surfaces(
         tile.valid, packet, {.footprint_per_t = pinhole.inverse_fx, .contrast = true});
     for (std::size_t i = 0; i < kPacket; ++i) {

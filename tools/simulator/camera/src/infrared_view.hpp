@@ -18,9 +18,10 @@ struct InfraredView {
   std::vector<float> signal;
 };
 
-/// Renders it at ray time `ray_time`. `projector_power` is the pattern's, times a D435i's.
+/// Renders it at a time [s] of the people's walk. `projector_power` is the pattern's, times a
+/// D435i's.
 [[nodiscard]] InfraredView see_infrared(const RayScene& rays, const Shader& shader,
                                         const CameraIntrinsics& intrinsics, const SE3& T_world_ir,
-                                        float ray_time, float projector_power);
+                                        double t_s, float projector_power);
 
 }  // namespace geoflow::simulator

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -14,6 +15,8 @@
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
+
+#include "src/candidates.hpp"
 
 namespace geoflow::simulator {
 namespace {
@@ -212,13 +215,18 @@ std::size_t RayScene::primitive(const RayPacket& packet, std::size_t lane) {
 }
 
 void RayScene::reset(RayPacket& packet) {
+  renew(packet);
+  std::ranges::fill(packet.ray.time, 0.0F);
+}
+
+void RayScene::renew(RayPacket& packet) {
   for (std::size_t i = 0; i < kPacket; ++i) {
     packet.ray.tnear[i] = kNear_m;
     packet.ray.tfar[i] = std::numeric_limits<float>::infinity();
-    packet.ray.time[i] = 0;
     packet.ray.mask[i] = ~0U;
     packet.ray.flags[i] = 0;
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
 }
@@ -227,6 +235,30 @@ void RayScene::trace(const Valid& valid, RayPacket& packet) const {
   intersect(standing_.get(), valid, packet);
   if (walking_) {
     intersect(walking_.get(), valid, packet);
+  }
+}
+
+void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
+                           RayPacket& packet) const {
+  if (candidates.anything()) {
+    trace(valid, packet);
+    return;
+  }
+  for (const std::uint32_t patch : candidates.patches()) {
+    flats_[patch].stop(patch, packet);
+  }
+  if (candidates.nothing()) {
+    return;
+  }
+  // Between two patches that touch, rounding may let a ray through.
+  Valid left = valid;
+  bool any = false;
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    left[i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? valid[i] : 0;
+    any = any || left[i] != 0;
+  }
+  if (any) {
+    trace(left, packet);
   }
 }
 

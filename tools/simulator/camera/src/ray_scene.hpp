@@ -12,6 +12,9 @@
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
+#include "src/candidates.hpp"
+#include "src/flat.hpp"
+
 namespace geoflow::simulator {
 
 inline constexpr std::size_t kPacket = kLanes;  ///< rays traced together
@@ -31,15 +34,21 @@ class RayScene {
   void move_people(double begin_s, double end_s);
   /// The ray time of a moment; 0 … 1 within what the people were moved to, and never beyond.
   [[nodiscard]] float ray_time(double t_s) const noexcept;
-  /// How far any part of the people moves during a time, at most [m].
+  /// How far any part of the people moves from begin_s to end_s, at most [m]; or during a part of
+  /// it.
+  [[nodiscard]] float people_travel_m() const noexcept { return people_travel_m_; }
   [[nodiscard]] float people_travel_m(double duration_s) const noexcept;
 
   /// Sets a packet's members that all rays share: no hit yet, time 0, from 1 mm on to infinity.
   static void reset(RayPacket& packet);
+  /// The same but for the time.
+  static void renew(RayPacket& packet);
   /// The first hits of the lanes with valid[i] == -1; hit.geomID stays RTC_INVALID_GEOMETRY_ID
   /// without one.
   void trace(const Valid& valid, RayPacket& packet) const;
-  /// The same among the things that stand still.
+  /// The same for rays that can meet nothing but `candidates`.
+  void trace_among(const Candidates& candidates, const Valid& valid, RayPacket& packet) const;
+  /// The same as trace() among the things that stand still.
   void trace_static(const Valid& valid, RayPacket& packet) const;
   /// Is there something that stands still between `from` and `to`, 2 mm from either?
   [[nodiscard]] bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;
@@ -47,6 +56,7 @@ class RayScene {
   /// The number of the patch, of the capsule or of the person's capsule that a lane hit.
   [[nodiscard]] static std::size_t primitive(const RayPacket& packet, std::size_t lane);
 
+  [[nodiscard]] const Scene& scene() const noexcept { return *scene_; }
   /// A person's capsule at time 0 of the interval, by that number.
   [[nodiscard]] const Capsule& person_capsule(std::size_t primitive) const {
     return people_begin_[primitive];
@@ -61,12 +71,14 @@ class RayScene {
   template <typename Handle>
   using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
-  explicit RayScene(const Scene& scene) : scene_{&scene} {}
+  explicit RayScene(const Scene& scene)
+      : scene_{&scene}, flats_(scene.patches.begin(), scene.patches.end()) {}
   void add_patches();
   void add_capsules();
   void add_people();
 
   const Scene* scene_;
+  std::vector<Flat> flats_;  ///< of the patches
   Owned<RTCDevice> device_;
   Owned<RTCScene> standing_;
   Owned<RTCScene> walking_;  ///< the people; null if there are none

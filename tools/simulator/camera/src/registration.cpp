@@ -1,7 +1,7 @@
 #include "src/registration.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -9,16 +9,16 @@
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 
 #include "src/view.hpp"
 
 namespace geoflow::simulator {
 namespace {
 
-using Eigen::Vector2f;
-using Eigen::Vector3f;
+constexpr float kMillimetres = 1000.0F;
 
-/// Projects the corner (x, y) of a depth pixel of that depth.
+/// Projects corners of depth pixels into the colour image. By value in vector loops.
 struct Projection {
   View ir;  // in the colour camera's frame
   Pinhole pinhole;
@@ -27,33 +27,75 @@ struct Projection {
   float cx = 0;
   float cy = 0;
 
-  [[nodiscard]] Vector3f point(float x, float y, float depth_m) const {
-    return ir.R_world_cam * (depth_m * pinhole.direction(x, y)) + ir.p_world_cam;
-  }
-  [[nodiscard]] Vector2f pixel(const Vector3f& p) const {
-    return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy};
+  struct Place {
+    float x;  ///< [px]
+    float y;
+    float depth_m;
+  };
+  [[gnu::always_inline]] inline Place project(float x, float y, float depth_m) const {
+    const float along_x = depth_m * ((x - pinhole.cx) * pinhole.inverse_fx);
+    const float along_y = depth_m * ((y - pinhole.cy) * pinhole.inverse_fy);
+    const auto axis = [&](int i) __attribute__((always_inline)) {
+      return ir.R_world_cam(i, 0) * along_x + ir.R_world_cam(i, 1) * along_y +
+             ir.R_world_cam(i, 2) * depth_m + ir.p_world_cam[i];
+    };
+    const float z = axis(2);
+    return {.x = fx * axis(0) / z + cx, .y = fy * axis(1) / z + cy, .depth_m = z};
   }
 };
 
-/// The pixel that a place in an image lies in; pixel 0 reaches from -0.5 to 0.5.
-int pixel_at(float place) {
-  const float from_edge = place + 0.5F;
-  return static_cast<int>(from_edge);
+/// The pixel that a place in an image lies in; pixel 0 reaches from -0.5 to 0.5. Beyond the image,
+/// one that is not in it.
+[[gnu::always_inline]] inline int pixel_at(float place, int size) {
+  return static_cast<int>(held(place + 0.5F, -1.0F, static_cast<float>(size)));
 }
 
-/// Pixels of an image, the last ones included.
-struct Patch {
-  int left;
-  int top;
-  int right;
-  int bottom;
+/// What pixels of the colour image some pixels of the depth image cover, the last ones included,
+/// and in which depth.
+struct Covered {
+  std::array<int, kLanes> left{};
+  std::array<int, kLanes> top{};
+  std::array<int, kLanes> right{};
+  std::array<int, kLanes> bottom{};
+  std::array<int, kLanes> depth_mm{};  ///< 0: none
 };
 
-/// Leaves in each pixel of the patch the nearest depth; 0 is none.
-void fill_nearest(const Patch& patch, std::uint16_t depth_mm, int width,
+/// Of the pixels (x, y), (x + 1, y), … with those depths.
+Covered cover(const Projection& projection, const CameraIntrinsics& color, const Lanes& depths_m,
+              int x, int y) {
+  constexpr float kNearest_m = 0.01F;
+  constexpr auto kLargest = static_cast<float>(std::numeric_limits<std::uint16_t>::max());
+  Covered covered;
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    const Projection to_color = projection;
+    const int width = color.width;
+    const int height = color.height;
+    const auto row = static_cast<float>(y);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float depth_m = depths_m[i];
+      const auto column = static_cast<float>(x + static_cast<int>(i));
+      const float centre_m = to_color.project(column, row, depth_m).depth_m;
+      const float rounded = held(kMillimetres * centre_m + 0.5F, 0.0F, kLargest + 1.0F);
+      const auto millimetres = static_cast<int>(rounded);
+      const bool seen = depth_m > 0.0F && centre_m >= kNearest_m && rounded < kLargest + 1.0F;
+      covered.depth_mm[i] = seen ? millimetres : 0;
+      const auto low = to_color.project(column - 0.5F, row - 0.5F, depth_m);
+      const auto high = to_color.project(column + 0.5F, row + 0.5F, depth_m);
+      covered.left[i] = std::max(0, pixel_at(low.x, width));
+      covered.top[i] = std::max(0, pixel_at(low.y, height));
+      covered.right[i] = std::min(width - 1, pixel_at(high.x, width));
+      covered.bottom[i] = std::min(height - 1, pixel_at(high.y, height));
+    }
+  });
+  return covered;
+}
+
+/// Leaves in each pixel that lane `i` covers the nearest depth; 0 is none.
+void fill_nearest(const Covered& covered, std::size_t i, int width,
                   std::span<std::uint16_t> out_mm) {
-  for (int row = patch.top; row <= patch.bottom; ++row) {
-    for (int column = patch.left; column <= patch.right; ++column) {
+  const auto depth_mm = static_cast<std::uint16_t>(covered.depth_mm[i]);
+  for (int row = covered.top[i]; row <= covered.bottom[i]; ++row) {
+    for (int column = covered.left[i]; column <= covered.right[i]; ++column) {
       std::uint16_t& pixel =
           out_mm[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                  static_cast<std::size_t>(column)];
@@ -66,9 +108,6 @@ void fill_nearest(const Patch& patch, std::uint16_t depth_mm, int width,
 
 void align_to_color(const std::vector<float>& depth_m, const Registration& registration,
                     std::span<std::uint16_t> out_mm) {
-  constexpr float kMillimetres = 1000.0F;
-  constexpr float kNearest_m = 0.01F;
-  constexpr auto kLargest = static_cast<float>(std::numeric_limits<std::uint16_t>::max());
   const CameraIntrinsics& color = registration.color;
   const Projection projection{.ir = View{registration.T_cam_ir},
                               .pinhole = Pinhole{registration.depth},
@@ -77,25 +116,18 @@ void align_to_color(const std::vector<float>& depth_m, const Registration& regis
                               .cx = static_cast<float>(color.cx),
                               .cy = static_cast<float>(color.cy)};
   std::ranges::fill(out_mm, std::uint16_t{0});
+  const auto width = static_cast<std::size_t>(registration.depth.width);
   for (int y = 0; y < registration.depth.height; ++y) {
-    for (int x = 0; x < registration.depth.width; ++x) {
-      const float depth =
-          depth_m[static_cast<std::size_t>(y) * static_cast<std::size_t>(registration.depth.width) +
-                  static_cast<std::size_t>(x)];
-      const auto at_x = static_cast<float>(x);
-      const auto at_y = static_cast<float>(y);
-      const Vector3f centre = projection.point(at_x, at_y, depth);
-      const float millimetres = std::round(kMillimetres * centre.z());
-      if (depth <= 0 || centre.z() < kNearest_m || millimetres > kLargest) {
-        continue;
+    const std::span row = std::span{depth_m}.subspan(static_cast<std::size_t>(y) * width, width);
+    for (std::size_t x = 0; x < width; x += kLanes) {
+      Lanes depths_m{};
+      std::ranges::copy(row.subspan(x, std::min(kLanes, width - x)), depths_m.begin());
+      const Covered covered = cover(projection, color, depths_m, static_cast<int>(x), y);
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        if (covered.depth_mm[i] != 0) {
+          fill_nearest(covered, i, color.width, out_mm);
+        }
       }
-      const Vector2f low = projection.pixel(projection.point(at_x - 0.5F, at_y - 0.5F, depth));
-      const Vector2f high = projection.pixel(projection.point(at_x + 0.5F, at_y + 0.5F, depth));
-      fill_nearest({.left = std::max(0, pixel_at(low.x())),
-                    .top = std::max(0, pixel_at(low.y())),
-                    .right = std::min(color.width - 1, pixel_at(high.x())),
-                    .bottom = std::min(color.height - 1, pixel_at(high.y()))},
-                   static_cast<std::uint16_t>(millimetres), color.width, out_mm);
     }
   }
 }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -46,9 +46,12 @@ class Curve {
       // NOLINTEND(readability-magic-numbers)
     }
   }
-  [[nodiscard]] std::uint8_t operator()(float linear) const noexcept {
-    const float from_edge = std::clamp(linear, 0.0F, 1.0F) * static_cast<float>(kSteps - 1) + 0.5F;
-    return codes_[static_cast<std::size_t>(from_edge)];
+  /// Which step of the curve a value is at.
+  [[nodiscard, gnu::always_inline]] static int step(float linear) noexcept {
+    return static_cast<int>(held(linear, 0.0F, 1.0F) * static_cast<float>(kSteps - 1) + 0.5F);
+  }
+  [[nodiscard]] std::byte code(int step) const noexcept {
+    return std::byte{codes_[static_cast<std::size_t>(step)]};
   }
 
  private:
@@ -62,38 +65,67 @@ double electrons_per_nit(double exposure_s) {
   return kQuarterTurn * kTransmission / (kFNumber * kFNumber) * kElectronsPerLuxSecond * exposure_s;
 }
 
+/// One number for each of red, green and blue of kLanes pixels.
+template <typename Number>
+using Channels = std::array<std::array<Number, kLanes>, 3>;
+
 /// Signals [electrons] to shares of the range, with noise.
 struct Pixel {
   float electrons_per_nit;
   float inverse_full_well;  ///< with gain
   float noise_scale;
 
-  /// `bits`: of this pixel.
-  [[nodiscard, gnu::always_inline]] Rgb read(const Rgb& light, std::uint32_t bits) const noexcept {
+  /// `bits`: of the first pixel; the others' follow.
+  [[nodiscard, gnu::always_inline]] inline Channels<float> read(const LaneColours& light,
+                                                                std::uint32_t bits) const noexcept {
     constexpr auto kReadVariance = static_cast<float>(kReadNoise * kReadNoise);
-    const Rgb signal = light * electrons_per_nit;
-    std::array<float, 4> noise{};
-    for (std::size_t c = 0; c < noise.size(); ++c) {
-      const float variance = std::max(signal[static_cast<int>(c)], 0.0F) + kReadVariance;
-      noise[c] = std::sqrt(variance) *
-                 to_normal32(scramble32(bits + static_cast<std::uint32_t>(c) * kChannelStep));
+    const float per_nit = electrons_per_nit;
+    const float scale = noise_scale;
+    const float inverse_range = inverse_full_well;
+    Channels<float> values;
+    for (std::size_t c = 0; c < values.size(); ++c) {
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const float signal = light[i][static_cast<int>(c)] * per_nit;
+        const std::uint32_t own = scramble32(bits + static_cast<std::uint32_t>(i));
+        const float noise =
+            std::sqrt(held(signal, 0.0F, kMost) + kReadVariance) *
+            to_normal32(scramble32(own + static_cast<std::uint32_t>(c) * kChannelStep));
+        values[c][i] = (signal + scale * noise) * inverse_range;
+      }
     }
-    return (signal + noise_scale * std::bit_cast<Rgb>(noise)) * inverse_full_well;
+    return values;
   }
 
  private:
   static constexpr std::uint32_t kChannelStep = 0x9e3779b9U;  // 2^32 over the golden ratio
+  static constexpr float kMost = std::numeric_limits<float>::max();
 };
 
-/// Writes pixel i of an image that is grey, or blue, green and red.
-[[gnu::always_inline]] inline void write(const Curve& curve, const Rgb& value, bool grey,
-                                         std::size_t i, std::span<std::byte> image) {
-  if (grey) {
-    image[i] = static_cast<std::byte>(curve(luminance(value)));
-    return;
+/// Steps of the curve for pixels that are grey (the first channel's), or of three colours.
+[[gnu::always_inline]] inline Channels<int> encode(const Channels<float>& values, bool grey) {
+  Channels<int> steps{};
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      steps[c][i] = Curve::step(values[c][i]);
+    }
   }
-  for (std::size_t c = 0; c < 3; ++c) {
-    image[3 * i + c] = static_cast<std::byte>(curve(value[2 - c]));
+  for (std::size_t i = 0; grey && i < kLanes; ++i) {
+    steps[0][i] = Curve::step(luminance(Rgb{values[0][i], values[1][i], values[2][i], 0}));
+  }
+  return steps;
+}
+
+/// Writes `count` pixels that are grey, or blue, green and red.
+void write(const Curve& curve, const Channels<int>& steps, bool grey, std::size_t count,
+           std::span<std::byte> image) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (grey) {
+      image[i] = curve.code(steps[0][i]);
+      continue;
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      image[3 * i + c] = curve.code(steps[2 - c][i]);
+    }
   }
 }
 
@@ -118,15 +150,20 @@ FrameRef develop(const std::vector<Rgb>& luminance_nit, const Exposure& exposure
                     .inverse_full_well = static_cast<float>(exposure.gain / kFullWell),
                     .noise_scale = static_cast<float>(options.noise_scale)};
   const auto width = static_cast<std::size_t>(options.width);
+  const std::size_t bytes_a_pixel = grey ? 1 : 3;
   tbb::parallel_for(std::size_t{0}, static_cast<std::size_t>(options.height), [&](std::size_t row) {
-    with_wide_vectors([&]() __attribute__((always_inline)) {
-      const auto row_key = static_cast<std::uint32_t>(subkey(key, row));
-      for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
-        const Rgb value =
-            pixel.read(luminance_nit[i], scramble32(row_key + static_cast<std::uint32_t>(i)));
-        write(curve, value, grey, i, bytes);
-      }
-    });
+    const auto row_key = static_cast<std::uint32_t>(subkey(key, row));
+    const std::size_t end = (row + 1) * width;
+    for (std::size_t i = row * width; i < end; i += kLanes) {
+      const std::size_t count = std::min(kLanes, end - i);
+      LaneColours light{};
+      std::copy_n(luminance_nit.begin() + static_cast<std::ptrdiff_t>(i), count, light.begin());
+      Channels<int> steps;
+      with_wide_vectors([&]() __attribute__((always_inline)) {
+        steps = encode(pixel.read(light, row_key + static_cast<std::uint32_t>(i)), grey);
+      });
+      write(curve, steps, grey, count, bytes.subspan(bytes_a_pixel * i));
+    }
   });
   return frame;
 }

@@ -22,31 +22,11 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr float kInversePi = std::numbers::inv_pi_v<float>;
-constexpr float kFlattest = 0.02F;         // cosine below which a footprint does not grow further
-constexpr float kFaintestMirror = 0.004F;  // below this a reflection is not traced
+constexpr float kFlattest = 0.02F;  // cosine below which a footprint does not grow further
 constexpr float kShortest_m2 = 1e-8F;
-constexpr float kBrightestGlint = 1.5F;  // of white paper in the same light
-constexpr float kFaintest_nit = 1e-6F;
 constexpr float kShadow_m = 0.52F;       // about the feet's middle
 constexpr float kShadowHeight_m = 0.5F;  // above the floor
 constexpr float kBody_m = 1.0F;          // the height of a body's middle
-
-Vector3f direction_of(const RayPacket& packet, std::size_t lane) {
-  return {packet.ray.dir_x[lane], packet.ray.dir_y[lane], packet.ray.dir_z[lane]};
-}
-
-Vector3f end_of(const RayPacket& packet, std::size_t lane) {
-  return Vector3f{packet.ray.org_x[lane], packet.ray.org_y[lane], packet.ray.org_z[lane]} +
-         packet.ray.tfar[lane] * direction_of(packet, lane);
-}
-
-/// How many of a pixel's rays see a mirror image that makes that share of its light.
-int mirror_rays(float share, int rays_a_pixel) {
-  constexpr float kFewest = 0.25F;
-  constexpr float kEager = 2.0F;
-  const float part = std::clamp(kEager * share, kFewest, 1.0F);
-  return static_cast<int>(std::ceil(part * static_cast<float>(rays_a_pixel)));
-}
 
 }  // namespace
 
@@ -201,6 +181,21 @@ void Shader::paint(const Patch& patch, const Hits& hits, const Look& look, LaneC
   }
 }
 
+void Shader::light_and_paint(std::size_t index, const Hits& hits, const Look& look,
+                             LaneColours& irradiance, LaneColours& albedo, Lanes& contrast) const {
+  const Patch& patch = scene_->patches[index];
+  const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
+  lighting_->on_patch(index, hits.u, hits.v, irradiance);
+  if (!people_.empty()) {
+    dim_by_people(hits, irradiance);
+  }
+  if (material.texture >= 0) {
+    paint(patch, hits, look, albedo, contrast);
+  } else {
+    albedo.fill(material.albedo);
+  }
+}
+
 void Shader::look_at_patch(std::size_t index, const Valid& lanes, const RayPacket& packet,
                            const Look& look, Surfaces& seen) const {
   const Patch& patch = scene_->patches[index];
@@ -213,16 +208,8 @@ void Shader::look_at_patch(std::size_t index, const Valid& lanes, const RayPacke
   LaneColours other_albedo;
   LaneColours& irradiance = whole ? seen.irradiance : other_irradiance;
   LaneColours& albedo = whole ? seen.albedo : other_albedo;
-  lighting_->on_patch(index, hits.u, hits.v, irradiance);
-  if (!people_.empty()) {
-    dim_by_people(hits, irradiance);
-  }
   Lanes contrast{};
-  if (material.texture >= 0) {
-    paint(patch, hits, look, albedo, contrast);
-  } else {
-    albedo.fill(material.albedo);
-  }
+  light_and_paint(index, hits, look, irradiance, albedo, contrast);
   const Vector3f normal = hits.facing * patch.normal();
   for (std::size_t i = 0; i < kPacket; ++i) {
     if (lanes[i] == 0) {
@@ -295,13 +282,6 @@ Surfaces Shader::surfaces(const Valid& valid, const RayPacket& packet, const Loo
   return seen;
 }
 
-float Shader::mirror_reflectance(const Material& material, float cosine) noexcept {
-  const float grazing = 1.0F - cosine;
-  const float power = grazing * grazing * grazing * grazing * grazing;
-  const float reflectivity = material.reflectivity;
-  return reflectivity <= 0 ? 0 : reflectivity + (1.0F - reflectivity) * power;
-}
-
 Rgb Shader::light_of(const Surfaces& seen, const RayPacket& packet, std::size_t lane) const {
   if (seen.material[lane] == nullptr) {
     return lighting_->sky(direction_of(packet, lane).normalized());
@@ -310,72 +290,54 @@ Rgb Shader::light_of(const Surfaces& seen, const RayPacket& packet, std::size_t 
          (seen.irradiance[lane] * kInversePi + seen.material[lane]->emission_nit);
 }
 
+bool Shader::shade_one_patch(const Valid& valid, const RayPacket& packet, const Look& look,
+                             LaneColours& sum) const {
+  const auto first = static_cast<std::size_t>(std::ranges::find(valid, -1) - valid.begin());
+  if (first == kPacket || packet.hit.geomID[first] != static_cast<unsigned>(HitKind::kPatch)) {
+    return false;
+  }
+  const unsigned index = packet.hit.primID[first];
+  unsigned others = 0;
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const unsigned other = (packet.hit.primID[i] ^ index) | packet.hit.geomID[i];
+    others |= valid[i] != 0 ? other : 0U;
+  }
+  static_assert(static_cast<unsigned>(HitKind::kPatch) == 0);
+  const Patch& patch = scene_->patches[index];
+  const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
+  if (others != 0 || material.reflectivity > 0) {
+    return false;
+  }
+  const Hits hits = meet(patch, packet, look, first);
+  LaneColours light;
+  LaneColours albedo;
+  Lanes contrast{};
+  light_and_paint(index, hits, look, light, albedo, contrast);
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    sum[i] += albedo[i] * (light[i] * kInversePi + material.emission_nit);
+  }
+  return true;
+}
+
 void Shader::shade(const Valid& valid, const RayPacket& packet, const Look& look,
-                   LaneColours& out) const {
+                   Mirrored& mirrored, LaneColours& sum) const {
+  if (shade_one_patch(valid, packet, look, sum)) {
+    return;
+  }
   const Surfaces seen = surfaces(valid, packet, look);
+  LaneColours light{};
   bool mirrors = false;
   for (std::size_t i = 0; i < kPacket; ++i) {
     if (valid[i] != 0) {
-      out[i] = light_of(seen, packet, i);
+      light[i] = light_of(seen, packet, i);
       mirrors = mirrors || (seen.material[i] != nullptr && seen.material[i]->reflectivity > 0);
     }
   }
   if (mirrors) {
-    add_mirrors(seen, packet, look, out);
+    mirror(seen, packet, look, mirrored, light, sum);
   }
-}
-
-void Shader::add_mirrors(const Surfaces& seen, const RayPacket& packet, const Look& look,
-                         LaneColours& out) const {
-  Valid valid{};
-  Lanes weight{};
-  RayPacket mirrored;
-  RayScene::reset(mirrored);
-  bool any = false;
   for (std::size_t i = 0; i < kPacket; ++i) {
-    if (seen.material[i] == nullptr) {
-      continue;
-    }
-    const float share = mirror_reflectance(*seen.material[i], seen.cosine[i]);
-    if (share <= kFaintestMirror) {
-      continue;
-    }
-    out[i] *= 1.0F - share;
-    const int rays = mirror_rays(share, look.rays_a_pixel);
-    if (look.order[i] >= rays) {
-      continue;
-    }
-    weight[i] = share * static_cast<float>(look.rays_a_pixel) / static_cast<float>(rays);
-    valid[i] = -1;
-    any = true;
-    const std::uint64_t key = subkey(look.key, i);
-    const Vector3f tilt{to_normal(key), to_normal(scramble(key)), to_normal(scramble(key + 1))};
-    const Vector3f normal = (Vector3f{seen.normal_x[i], seen.normal_y[i], seen.normal_z[i]} +
-                             seen.material[i]->roughness * tilt)
-                                .normalized();
-    const Vector3f incoming = direction_of(packet, i).normalized();
-    aim(mirrored, i, end_of(packet, i), incoming - 2.0F * incoming.dot(normal) * normal);
-    mirrored.ray.time[i] = packet.ray.time[i];
-  }
-  if (!any) {
-    return;
-  }
-  rays_->trace(valid, mirrored);
-  const Surfaces image =
-      surfaces(valid, mirrored,
-               {.footprint_per_t = 2.0F * look.footprint_per_t, .rays_a_pixel = look.rays_a_pixel});
-  for (std::size_t i = 0; i < kPacket; ++i) {
-    if (valid[i] == 0) {
-      continue;
-    }
-    Rgb light = light_of(image, mirrored, i);
-    const float share = mirror_reflectance(*seen.material[i], seen.cosine[i]);
-    // A lamp's image on a rough mirror is a patch of glints. One ray of a few would make a spark of
-    // each: it counts at most as much as blinds the sensor.
-    const float white = luminance(seen.irradiance[i]) * kInversePi;
-    const float brightness = luminance(light);
-    light *= std::min(1.0F, kBrightestGlint * white / std::max(brightness * share, kFaintest_nit));
-    out[i] += light * weight[i];
+    sum[i] += light[i];
   }
 }
 

@@ -49,8 +49,20 @@ class Shader {
     /// image is seen by the first ones alone, which count for the others.
     std::array<int, kPacket> order{};
   };
-  /// Luminance [cd/m^2] seen by each valid lane of a traced packet.
-  void shade(const Valid& valid, const RayPacket& packet, const Look& look, LaneColours& out) const;
+  /// Mirrored rays, of some of a tile's packets, whose light is still to be added.
+  struct Mirrored {
+    RayPacket packet;  ///< set as far as `count`
+    std::size_t count = 0;
+    std::array<std::size_t, kPacket> lane{};  ///< of the ray that was mirrored
+    Lanes weight{};                           ///< of its light
+    Lanes brightest_nit{};                    ///< it counts for at most
+  };
+  /// Adds the luminance [cd/m^2] seen by each valid lane of a traced packet to `sum`, but for
+  /// mirror images: those of rays that are left in `mirrored` are added by add_mirrored() or a
+  /// later call with the same `sum`.
+  void shade(const Valid& valid, const RayPacket& packet, const Look& look, Mirrored& mirrored,
+             LaneColours& sum) const;
+  void add_mirrored(const Look& look, Mirrored& mirrored, LaneColours& sum) const;
 
   /// The surfaces that the valid lanes hit.
   [[nodiscard]] Surfaces surfaces(const Valid& valid, const RayPacket& packet,
@@ -83,6 +95,8 @@ class Shader {
   };
   [[nodiscard]] static Hits meet(const Patch& patch, const RayPacket& packet, const Look& look,
                                  std::size_t lane);
+  void light_and_paint(std::size_t index, const Hits& hits, const Look& look,
+                       LaneColours& irradiance, LaneColours& albedo, Lanes& contrast) const;
   void look_at_patch(std::size_t index, const Valid& lanes, const RayPacket& packet,
                      const Look& look, Surfaces& seen) const;
   void look_at_round(std::size_t lane, const RayPacket& packet, Surfaces& seen) const;
@@ -90,8 +104,10 @@ class Shader {
              Lanes& contrast) const;
   void dim_by_people(const Hits& hits, LaneColours& irradiance) const;
   [[nodiscard]] Rgb light_of(const Surfaces& seen, const RayPacket& packet, std::size_t lane) const;
-  void add_mirrors(const Surfaces& seen, const RayPacket& packet, const Look& look,
-                   LaneColours& out) const;
+  [[nodiscard]] bool shade_one_patch(const Valid& valid, const RayPacket& packet, const Look& look,
+                                     LaneColours& sum) const;
+  void mirror(const Surfaces& seen, const RayPacket& packet, const Look& look, Mirrored& mirrored,
+              LaneColours& light, LaneColours& sum) const;
 
   const Scene* scene_;
   const RayScene* rays_;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 
 namespace geoflow::simulator {
@@ -29,31 +30,55 @@ SmoothNoise::Weights SmoothNoise::weights(float position) noexcept {
   return result;
 }
 
-SmoothNoise::SmoothNoise(std::uint64_t key, int width, float pitch_x, float pitch_y)
-    : key_{key}, pitch_y_{pitch_y} {
-  for (int x = 0; x < width; ++x) {
-    pixels_.push_back(weights(static_cast<float>(x) / pitch_x));
-    columns_ = std::max(columns_, pixels_.back().first + 4);
+SmoothNoise::SmoothNoise(std::uint64_t key, int width, int height, float pitch_x, float pitch_y)
+    : width_{static_cast<std::size_t>(width)},
+      pitch_y_{pitch_y},
+      across_((width_ + kLanes - 1) / kLanes) {
+  for (std::size_t x = 0; x < width_; ++x) {
+    const Weights place = weights(static_cast<float>(x) / pitch_x);
+    Across& across = across_[x / kLanes];
+    const std::size_t lane = x % kLanes;
+    across.first[lane] = static_cast<std::uint32_t>(place.first);
+    for (std::size_t k = 0; k < place.weight.size(); ++k) {
+      across.weight[k][lane] = place.weight[k];
+    }
+    across.scale[lane] = place.scale;
+    columns_ = std::max(columns_, place.first + place.weight.size());
+  }
+  const Weights last = weights(static_cast<float>(height - 1) / pitch_y);
+  for (std::size_t row = 0; row < last.first + last.weight.size(); ++row) {
+    const std::uint64_t row_key = subkey(key, row);
+    for (std::size_t column = 0; column < columns_; ++column) {
+      nodes_.push_back(to_normal(scramble(row_key + column)));
+    }
   }
 }
 
 void SmoothNoise::row(int y, std::vector<float>& out) const {
   const Weights down = weights(static_cast<float>(y) / pitch_y_);
-  std::vector<float> nodes(columns_);
+  std::vector<float> blended(columns_);
   for (std::size_t k = 0; k < down.weight.size(); ++k) {
-    const std::uint64_t row_key = subkey(key_, down.first + k);
     for (std::size_t column = 0; column < columns_; ++column) {
-      nodes[column] += down.weight[k] * to_normal(scramble(row_key + column));
+      blended[column] += down.weight[k] * nodes_[(down.first + k) * columns_ + column];
     }
   }
-  out.resize(pixels_.size());
-  for (std::size_t x = 0; x < pixels_.size(); ++x) {
-    const Weights& across = pixels_[x];
-    float sum = 0;
-    for (std::size_t k = 0; k < across.weight.size(); ++k) {
-      sum += across.weight[k] * nodes[across.first + k];
-    }
-    out[x] = sum * across.scale * down.scale;
+  out.resize(width_);
+  for (std::size_t x = 0; x < width_; x += kLanes) {
+    const Across& across = across_[x / kLanes];
+    Lanes field;
+    with_wide_vectors([&]() __attribute__((always_inline)) {
+      const float* const nodes = blended.data();
+      const float scale = down.scale;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        float sum = 0;
+        for (std::size_t k = 0; k < across.weight.size(); ++k) {
+          sum += across.weight[k][i] * nodes[across.first[i] + k];
+        }
+        field[i] = sum * across.scale[i] * scale;
+      }
+    });
+    std::copy_n(field.begin(), std::min(kLanes, width_ - x),
+                out.begin() + static_cast<std::ptrdiff_t>(x));
   }
 }
 

@@ -4,8 +4,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <vector>
 
+#include "geoflow/tools/simulator/scene.hpp"
+
+#include "src/candidates.hpp"
+#include "src/outlines.hpp"
 #include "src/ray_scene.hpp"
 #include "src/tiles.hpp"
 #include "src/view.hpp"
@@ -15,35 +21,15 @@ namespace {
 
 using Eigen::Vector3f;
 
-// Half a pixel of jitter, one for what lies between rays, half for what moves otherwise than the
-// tile's middle.
-constexpr float kMargin_px = 2.0F;
+// Half a pixel of jitter, half for what moves otherwise than the tile's middle, and three because
+// a corner of something may stick out between rays four pixels apart, or its outline be a little
+// off.
+constexpr float kMargin_px = 4.0F;
 constexpr float kMost_px = 1e4F;
 constexpr float kFlattest = 0.1F;  // of a view's direction, off its axis
-constexpr int kUnknown = -3;
+constexpr float kBehind = 1.02F;   // an outline farther than that is behind what a tile sees
 // Moments of an exposure, from its middle.
 constexpr std::array<double, 4> kShares{-0.5, -0.25, 0.25, 0.5};
-
-/// What the valid lanes of a packet see if it is the same for all.
-int common(const Valid& valid, const RayPacket& packet) {
-  int seen = kUnknown;
-  for (std::size_t i = 0; i < kPacket; ++i) {
-    if (valid[i] == 0) {
-      continue;
-    }
-    int here = SteadyTiles::kMixed;
-    if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-      here = SteadyTiles::kSky;
-    } else if (packet.hit.geomID[i] == static_cast<unsigned>(HitKind::kPatch)) {
-      here = static_cast<int>(packet.hit.primID[i]);
-    }
-    if (seen != kUnknown && seen != here) {
-      return SteadyTiles::kMixed;
-    }
-    seen = here;
-  }
-  return seen;
-}
 
 }  // namespace
 
@@ -53,18 +39,120 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
       rows_{(shutter.rows + kTile - 1) / kTile},
       pinhole_{pinhole},
       walk_m_{rays.people_travel_m(0.5 * shutter.exposure_s)},
+      moves_{shutter.exposure_s > 0},
       depths_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)),
       centre_(depths_.size()),
-      seen_(depths_.size(), kUnknown) {
+      seen_(depths_.size()) {
   for (int row = 0; row < rows_; ++row) {
     const double mid_s = shutter.row_mid_s(std::min(row * kTile + kTile / 2, shutter.rows - 1));
-    Glance glance{.mid_s = mid_s, .middle = track.at(mid_s), .others = {}};
+    middles_.push_back(track.at(mid_s));
+    Glances glances;
     for (const double share : kShares) {
-      glance.others.push_back(track.at(mid_s + share * shutter.exposure_s));
+      glances.push_back(track.at(mid_s + share * shutter.exposure_s));
     }
-    glances_.push_back(glance);
+    glances_.push_back(glances);
   }
-  look(rays, shutter, width);
+  join_corners(look_at_corners(rays, shutter));
+  add_outlines(rays);
+  spread();
+}
+
+int SteadyTiles::at(const Tile& tile) const noexcept {
+  const Candidates& may = candidates(tile);
+  if (may.none()) {
+    return kSky;
+  }
+  return may.one_patch() ? static_cast<int>(may.patches().front()) : kMixed;
+}
+
+std::vector<SteadyTiles::Sight> SteadyTiles::look_at_corners(const RayScene& rays,
+                                                             const Shutter& shutter) const {
+  const int across = columns_ + 1;
+  std::vector<Sight> corners(static_cast<std::size_t>(across) *
+                             static_cast<std::size_t>(rows_ + 1));
+  // An image of a pixel a corner.
+  for_each_tile(across, rows_ + 1, [&](const Tile& tile) {
+    RayPacket packet;
+    RayScene::reset(packet);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const int row = std::min(tile.y(i), rows_ - 1);
+      const View& view = middles_[static_cast<std::size_t>(row)];
+      aim(packet, i, view.p_world_cam,
+          view.R_world_cam * pinhole_.direction(static_cast<float>(tile.x(i) * kTile) - 0.5F,
+                                                static_cast<float>(tile.y(i) * kTile) - 0.5F));
+      packet.ray.time[i] =
+          rays.ray_time(shutter.row_mid_s(std::min(row * kTile + kTile / 2, shutter.rows - 1)));
+    }
+    rays.trace(tile.valid, packet);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (tile.valid[i] == 0) {
+        continue;
+      }
+      Sight& sight =
+          corners[static_cast<std::size_t>(tile.y(i)) * static_cast<std::size_t>(across) +
+                  static_cast<std::size_t>(tile.x(i))];
+      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+        sight.seen.add_nothing();
+        continue;
+      }
+      sight.depth_m = packet.ray.tfar[i];
+      if (packet.hit.geomID[i] == static_cast<unsigned>(HitKind::kPatch)) {
+        sight.seen.add_patch(packet.hit.primID[i]);
+      } else {
+        sight.seen.add_anything();
+      }
+    }
+  });
+  return corners;
+}
+
+void SteadyTiles::join_corners(const std::vector<Sight>& corners) {
+  const auto across = static_cast<std::size_t>(columns_) + 1;
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      const std::size_t here = index(column, row);
+      const std::size_t first = here + static_cast<std::size_t>(row);
+      for (const std::size_t corner : {first, first + 1, first + across, first + across + 1}) {
+        centre_[here].add(corners[corner].seen);
+        depths_[here].nearest_m = std::min(depths_[here].nearest_m, corners[corner].depth_m);
+        depths_[here].farthest_m = std::max(depths_[here].farthest_m, corners[corner].depth_m);
+      }
+    }
+  }
+}
+
+void SteadyTiles::add_outlines(const RayScene& rays) {
+  const Scene& scene = rays.scene();
+  const Outlines outlines{pinhole_, middles_, columns_};
+  std::vector<Outlines::Crossing> crossings;
+  const auto see = [&](const auto& add) {
+    for (const auto& [tile, depth_m] : crossings) {
+      Depths& depths = depths_[tile];
+      if (depth_m <= kBehind * depths.farthest_m) {
+        depths.nearest_m = std::min(depths.nearest_m, depth_m);
+        add(tile);
+      }
+    }
+    crossings.clear();
+  };
+  for (std::size_t patch = 0; patch < scene.patches.size(); ++patch) {
+    outlines.of(scene.patches[patch], crossings);
+    see([&](std::size_t tile) { centre_[tile].add_patch(static_cast<std::uint32_t>(patch)); });
+  }
+  for (const Capsule& capsule : scene.capsules) {
+    outlines.of(capsule, 0, crossings);
+    see([&](std::size_t tile) { centre_[tile].add_anything(); });
+  }
+  for (std::size_t i = 0; i < scene.pedestrians.size() * Pedestrian::kCapsules; ++i) {
+    outlines.of(rays.person_capsule(i), rays.people_travel_m(), crossings);
+    see([&](std::size_t tile) {
+      centre_[tile].add_anything();
+      depths_[tile].walk_m = walk_m_;
+    });
+  }
+}
+
+void SteadyTiles::spread() {
   Depths beyond{.nearest_m = std::numeric_limits<float>::infinity(),
                 .farthest_m = std::numeric_limits<float>::infinity(),
                 .walk_m = walk_m_};
@@ -75,36 +163,41 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
       mark(column, row, reach(column, row, depths_[here]), centre_[here]);
     }
   }
-  for (int row = -1; row <= rows_; ++row) {
+  Candidates anything;
+  anything.add_anything();
+  for (int row = -1; moves_ && row <= rows_; ++row) {
     const bool edge = row < 0 || row == rows_;
     for (int column = -1; column <= columns_; column += edge ? 1 : columns_ + 1) {
-      mark(column, row, reach(column, row, beyond), kMixed);
+      mark(column, row, reach(column, row, beyond), anything);
     }
   }
 }
 
 SteadyTiles::Reach SteadyTiles::reach(int column, int row, const Depths& depths) const {
-  const float middle = 0.5F * static_cast<float>(kTile - 1);
-  const Vector3f direction = pinhole_.direction(static_cast<float>(column * kTile) + middle,
-                                                static_cast<float>(row * kTile) + middle);
-  const Glance& glance = glances_[static_cast<std::size_t>(std::clamp(row, 0, rows_ - 1))];
   float left = 0;
   float right = 0;
   float up = 0;
   float down = 0;
-  for (const View& other : glance.others) {
-    const Eigen::Matrix3f to_other = other.R_world_cam.transpose();
-    const Vector3f turned = to_other * Vector3f{glance.middle.R_world_cam * direction};
-    const Vector3f shift = to_other * Vector3f{glance.middle.p_world_cam - other.p_world_cam};
-    for (const float inverse_m : {1.0F / depths.nearest_m, 1.0F / depths.farthest_m}) {
-      const Vector3f seen = turned + inverse_m * shift;
-      const float z = std::max(seen.z(), kFlattest);
-      const float dx = (seen.x() / z - direction.x()) / pinhole_.inverse_fx;
-      const float dy = (seen.y() / z - direction.y()) / pinhole_.inverse_fy;
-      left = std::max(left, -dx);
-      right = std::max(right, dx);
-      up = std::max(up, -dy);
-      down = std::max(down, dy);
+  if (moves_) {
+    const float middle = 0.5F * static_cast<float>(kTile - 1);
+    const Vector3f direction = pinhole_.direction(static_cast<float>(column * kTile) + middle,
+                                                  static_cast<float>(row * kTile) + middle);
+    const auto held_row = static_cast<std::size_t>(std::clamp(row, 0, rows_ - 1));
+    const View& from = middles_[held_row];
+    for (const View& other : glances_[held_row]) {
+      const Eigen::Matrix3f to_other = other.R_world_cam.transpose();
+      const Vector3f turned = to_other * Vector3f{from.R_world_cam * direction};
+      const Vector3f shift = to_other * Vector3f{from.p_world_cam - other.p_world_cam};
+      for (const float inverse_m : {1.0F / depths.nearest_m, 1.0F / depths.farthest_m}) {
+        const Vector3f seen = turned + inverse_m * shift;
+        const float z = std::max(seen.z(), kFlattest);
+        const float dx = (seen.x() / z - direction.x()) / pinhole_.inverse_fx;
+        const float dy = (seen.y() / z - direction.y()) / pinhole_.inverse_fy;
+        left = std::max(left, -dx);
+        right = std::max(right, dx);
+        up = std::max(up, -dy);
+        down = std::max(down, dy);
+      }
     }
   }
   const float walk_px = depths.walk_m / depths.nearest_m / pinhole_.inverse_fx;
@@ -114,42 +207,12 @@ SteadyTiles::Reach SteadyTiles::reach(int column, int row, const Depths& depths)
   return {.left = tiles(left), .right = tiles(right), .up = tiles(up), .down = tiles(down)};
 }
 
-void SteadyTiles::look(const RayScene& rays, const Shutter& shutter, int width) {
-  for_each_tile(width, shutter.rows, [&](const Tile& tile) {
-    const int row = tile.top / kTile;
-    const Glance& glance = glances_[static_cast<std::size_t>(row)];
-    RayPacket packet;
-    RayScene::reset(packet);
-    for (std::size_t i = 0; i < kPacket; ++i) {
-      aim(packet, i, glance.middle.p_world_cam,
-          glance.middle.R_world_cam *
-              pinhole_.direction(static_cast<float>(tile.x(i)), static_cast<float>(tile.y(i))));
-      packet.ray.time[i] = rays.ray_time(glance.mid_s);
-    }
-    rays.trace(tile.valid, packet);
-    Depths depths;
-    for (std::size_t i = 0; i < kPacket; ++i) {
-      if (tile.valid[i] != 0) {
-        depths.nearest_m = std::min(depths.nearest_m, packet.ray.tfar[i]);
-        depths.farthest_m = std::max(depths.farthest_m, packet.ray.tfar[i]);
-      }
-      if (packet.hit.geomID[i] == static_cast<unsigned>(HitKind::kPerson)) {
-        depths.walk_m = walk_m_;
-      }
-    }
-    const std::size_t here = index(tile.left / kTile, row);
-    depths_[here] = depths;
-    centre_[here] = common(tile.valid, packet);
-  });
-}
-
-void SteadyTiles::mark(int column, int row, const Reach& reach, int seen) {
+void SteadyTiles::mark(int column, int row, const Reach& reach, const Candidates& seen) {
   const int bottom = std::min(rows_ - 1, row + reach.down);
   const int right = std::min(columns_ - 1, column + reach.right);
   for (int y = std::max(0, row - reach.up); y <= bottom; ++y) {
     for (int x = std::max(0, column - reach.left); x <= right; ++x) {
-      int& known = seen_[index(x, y)];
-      known = known == kUnknown || known == seen ? seen : kMixed;
+      seen_[index(x, y)].add(seen);
     }
   }
 }

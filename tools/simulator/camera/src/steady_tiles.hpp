@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "src/candidates.hpp"
 #include "src/ray_scene.hpp"
 #include "src/tiles.hpp"
 #include "src/view.hpp"
@@ -25,15 +26,16 @@ struct Shutter {
   [[nodiscard]] double end_s() const noexcept { return t_mid_s + 0.5 * (exposure_s + readout_s); }
 };
 
-/// Which tiles of an image see one patch and nothing else during a whole exposure. Their rays need
-/// no tracing: they end where they meet the patch's plane.
+/// What the tiles of an image may see during a whole exposure: most of them one patch or a few.
+/// Their rays need no tracing: they end where they meet the nearest of those.
 ///
-/// One ray a pixel is traced at the middle of its row's exposure. Whatever is seen there stays
-/// within its reach during the exposure: where the camera's motion, at the tile's nearest and
-/// farthest depth, and a walker's own take it in the image. A tile is steady if all reaches that
-/// touch it are of the same patch. Beyond the image anything may be, but nothing nearer than the
-/// nearest that the image shows. What is
-/// thinner than a pixel may be missed, as it may be by any pixel's rays.
+/// In the middle of its row's exposure, a tile may see what rays through its corners meet, and
+/// whatever has an outline in it that is not behind all of that. It stays within its reach during
+/// the exposure: where the camera's motion, at the tile's nearest and farthest depth, and a
+/// walker's own take it in the image. What a tile may see is what has it in reach. Round things are
+/// left to tracing. Beyond the image anything may be, but nothing nearer than the nearest that the
+/// image shows. What comes out from behind something and is not seen before in its
+/// neighbourhood may be missed.
 class SteadyTiles {
  public:
   static constexpr int kMixed = -1;
@@ -42,10 +44,12 @@ class SteadyTiles {
   SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shutter& shutter, int width,
               const ViewTrack& track);
 
-  /// The patch that all of a tile's rays meet, or kSky, or kMixed.
-  [[nodiscard]] int at(const Tile& tile) const noexcept {
+  /// What a tile's rays may meet.
+  [[nodiscard]] const Candidates& candidates(const Tile& tile) const noexcept {
     return seen_[index(tile.left / kTile, tile.top / kTile)];
   }
+  /// The patch that all of a tile's rays meet, or kSky, or kMixed.
+  [[nodiscard]] int at(const Tile& tile) const noexcept;
 
  private:
   [[nodiscard]] std::size_t index(int column, int row) const noexcept {
@@ -65,24 +69,32 @@ class SteadyTiles {
     float farthest_m = 0;
     float walk_m = 0;
   };
-  /// Where a row of tiles looks during its exposure.
-  struct Glance {
-    double mid_s = 0;
-    View middle;
-    std::vector<View> others;
+  /// What one ray meets.
+  struct Sight {
+    Candidates seen;
+    float depth_m = std::numeric_limits<float>::infinity();
   };
-  void look(const RayScene& rays, const Shutter& shutter, int width);
+  /// Where a row of tiles looks at some moments of its exposure.
+  using Glances = std::vector<View>;
+
+  [[nodiscard]] std::vector<Sight> look_at_corners(const RayScene& rays,
+                                                   const Shutter& shutter) const;
+  void join_corners(const std::vector<Sight>& corners);
+  void add_outlines(const RayScene& rays);
+  void spread();
   [[nodiscard]] Reach reach(int column, int row, const Depths& depths) const;
-  void mark(int column, int row, const Reach& reach, int seen);
+  void mark(int column, int row, const Reach& reach, const Candidates& seen);
 
   int columns_;
   int rows_;
   Pinhole pinhole_;
-  float walk_m_;                 ///< how far people move during half the exposure
-  std::vector<Glance> glances_;  ///< of each row of tiles
-  std::vector<Depths> depths_;   ///< of each tile
-  std::vector<int> centre_;      ///< what each tile sees in the middle of its exposure
-  std::vector<int> seen_;
+  float walk_m_;                    ///< how far people move during half the exposure
+  bool moves_;                      ///< is there time for anything to move in?
+  std::vector<View> middles_;       ///< of each row of tiles, in the middle of its exposure
+  std::vector<Glances> glances_;    ///< of each row of tiles
+  std::vector<Depths> depths_;      ///< of each tile
+  std::vector<Candidates> centre_;  ///< what each tile may see in the middle of its exposure
+  std::vector<Candidates> seen_;
 };
 
 }  // namespace geoflow::simulator

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -26,8 +26,9 @@ constexpr float kLeastSignal = 0.008F;  // where half of the pixels have no meas
 constexpr float kPitchX_px = 8.0F;
 constexpr float kPitchY_px = 6.0F;
 constexpr float kRaggedPitch_px = 5.0F;
-constexpr float kRagged_px = 1.3F;    // how far an edge is seen beside its place
-constexpr float kStep_px = 1.0F;      // a jump of disparity that is an edge
+constexpr float kRagged_px = 1.3F;  // how far an edge is seen beside its place
+constexpr float kStep_px = 1.0F;    // a jump of disparity that is an edge
+constexpr float kNever_px = std::numeric_limits<float>::infinity();
 constexpr float kWhiteShare = 0.05F;  // of the variance that is not correlated
 constexpr float kSubpixelSteps = 32.0F;
 constexpr float kHoleSpread = 0.5F;  // of log signal about the least
@@ -41,6 +42,12 @@ std::vector<float> true_disparity(const InfraredView& seen, float focal_baseline
   return disparity;
 }
 
+[[gnu::always_inline]] inline float spread_of(float signal) noexcept {
+  constexpr float kFaintest = 1e-3F;
+  const float ratio = kFaintSignal / std::max(signal, kFaintest);
+  return std::sqrt(1.0F + ratio * ratio);
+}
+
 /// One row's worth of what is random.
 struct RandomRow {
   std::vector<float> noise;
@@ -48,6 +55,24 @@ struct RandomRow {
   std::vector<float> aside;
   std::vector<float> above;
 };
+
+/// Some pixels of a row, and what is random of them.
+struct Stretch {
+  int x = 0;  ///< of the first
+  int y = 0;
+  int count = 0;
+  Lanes signal{};
+  Lanes noise{};  ///< correlated
+  Lanes aside{};
+  Lanes above{};
+  Lanes white{};  ///< not correlated
+  Lanes chance{};
+  Lanes between{};
+};
+
+void take(const std::vector<float>& row, std::size_t first, std::size_t count, Lanes& lanes) {
+  std::copy_n(row.begin() + static_cast<std::ptrdiff_t>(first), count, lanes.begin());
+}
 
 /// Matches row by row; const and thread-safe.
 class Matcher {
@@ -61,10 +86,10 @@ class Matcher {
         height_{intrinsics.height},
         focal_baseline_{static_cast<float>(intrinsics.fx * kD435iBaseline_m)},
         disparity_{true_disparity(seen, focal_baseline_)},
-        noise_{subkey(key, "disparity"), width_, kPitchX_px, kPitchY_px},
-        holes_{subkey(key, "holes"), width_, kPitchX_px, kPitchY_px},
-        aside_{subkey(key, "aside"), width_, kRaggedPitch_px, kRaggedPitch_px},
-        above_{subkey(key, "above"), width_, kRaggedPitch_px, kRaggedPitch_px} {}
+        noise_{subkey(key, "disparity"), width_, height_, kPitchX_px, kPitchY_px},
+        holes_{subkey(key, "holes"), width_, height_, kPitchX_px, kPitchY_px},
+        aside_{subkey(key, "aside"), width_, height_, kRaggedPitch_px, kRaggedPitch_px},
+        above_{subkey(key, "above"), width_, height_, kRaggedPitch_px, kRaggedPitch_px} {}
 
   void row(int y, std::vector<float>& depth_m) const {
     RandomRow random;
@@ -72,19 +97,14 @@ class Matcher {
     holes_.row(y, random.holes);
     aside_.row(y, random.aside);
     above_.row(y, random.above);
-    // Seen from the right camera a point lies at x - d. Whatever lies right of it in the left image
-    // and left of it in the right one is nearer, and hides it.
-    float leftmost = std::numeric_limits<float>::infinity();
-    for (int x = width_ - 1; x >= 0; --x) {
-      const std::size_t i = index(x, y);
-      const float disparity = disparity_[i];
-      const float right_x = static_cast<float>(x) - disparity;
-      const bool hidden = right_x > leftmost + 1.0F || right_x < 0.0F;
-      leftmost = std::min(leftmost, right_x);
-      if (options_->depth_errors && (hidden || disparity == 0.0F)) {
-        continue;
-      }
-      depth_m[i] = measure(x, y, random);
+    const std::size_t begin = index(0, y);
+    for (int x = 0; x < width_; x += static_cast<int>(kLanes)) {
+      const Stretch stretch = draw(x, y, random);
+      const Lanes measured_m = measure(stretch);
+      take_over(measured_m, stretch, depth_m);
+    }
+    if (options_->depth_errors) {
+      drop_unseen(y, random.holes, std::span{depth_m}.subspan(begin, random.holes.size()));
     }
   }
 
@@ -93,37 +113,115 @@ class Matcher {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(x);
   }
-  [[nodiscard]] float disparity_at(int x, int y) const {
-    return disparity_[index(std::clamp(x, 0, width_ - 1), std::clamp(y, 0, height_ - 1))];
+
+  [[nodiscard]] Stretch draw(int x, int y, const RandomRow& random) const {
+    Stretch stretch{.x = x, .y = y, .count = std::min(static_cast<int>(kLanes), width_ - x)};
+    const auto count = static_cast<std::size_t>(stretch.count);
+    const auto column = static_cast<std::size_t>(x);
+    take(seen_->signal, index(x, y), count, stretch.signal);
+    take(random.noise, column, count, stretch.noise);
+    take(random.aside, column, count, stretch.aside);
+    take(random.above, column, count, stretch.above);
+    with_wide_vectors([&]() __attribute__((always_inline)) {
+      const std::uint64_t key = key_;
+      const std::uint64_t first = index(x, y);
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const std::uint64_t bits = subkey(key, first + i);
+        stretch.white[i] = to_normal(scramble(bits));
+        stretch.chance[i] = to_unit(bits);
+        stretch.between[i] = to_unit(scramble(bits + 1));
+      }
+    });
+    return stretch;
   }
 
-  [[nodiscard]] float measure(int x, int y, const RandomRow& random) const {
-    const std::size_t i = index(x, y);
-    const std::uint64_t bits = subkey(key_, i);
-    const auto column = static_cast<std::size_t>(x);
-    float disparity = disparity_[i];
-    if (options_->depth_errors) {
-      disparity = beside_edges(x, y, random, bits);
-      if (lost(seen_->signal[i], random.holes[column])) {
-        return 0;
+  /// Depth [m] of what windows about the pixels find; 0: none, or out of range.
+  [[nodiscard]] Lanes measure(const Stretch& stretch) const {
+    Lanes depth_m;
+    with_wide_vectors([&]() __attribute__((always_inline)) {
+      const Lanes found = beside_edges(stretch, options_->depth_errors ? kRagged_px : 0.0F,
+                                       options_->depth_errors ? kStep_px : kNever_px);
+      const auto scale = static_cast<float>(options_->depth_noise_scale);
+      const float spread = scale * static_cast<float>(options_->depth_subpixel_px);
+      const bool rounds = scale > 0;
+      const float correlated = std::sqrt(1.0F - kWhiteShare);
+      const float white = std::sqrt(kWhiteShare);
+      const auto nearest_m = static_cast<float>(options_->depth_min_m);
+      const auto farthest_m = static_cast<float>(options_->depth_max_m);
+      const float focal_baseline = focal_baseline_;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const float noise = correlated * stretch.noise[i] + white * stretch.white[i];
+        const float noisy = found[i] + spread * spread_of(stretch.signal[i]) * noise;
+        const float stepped =
+            static_cast<float>(whole_below(kSubpixelSteps * noisy + 0.5F)) / kSubpixelSteps;
+        const float disparity = rounds ? stepped : noisy;
+        const float depth = focal_baseline / disparity;
+        const bool seen =
+            found[i] > 0.0F && disparity > 0.0F && depth >= nearest_m && depth <= farthest_m;
+        depth_m[i] = seen ? depth : 0.0F;
+      }
+    });
+    return depth_m;
+  }
+
+  /// The disparities that windows find: beside a step it may be the neighbour's, something between,
+  /// or nothing (0). An edge is ragged by `ragged_px`; a step is one of disparity by `step_px`.
+  [[nodiscard, gnu::always_inline]] inline Lanes beside_edges(const Stretch& stretch,
+                                                              float ragged_px,
+                                                              float step_px) const {
+    constexpr float kNothing = 0.35F;
+    constexpr float kBetween = 0.5F;
+    const float* const disparities = disparity_.data();
+    const int width = width_;
+    const int last_x = width_ - 1;
+    const int last_y = height_ - 1;
+    Lanes found;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const int x =
+          stretch.x + static_cast<int>(i) + whole_below(ragged_px * stretch.aside[i] + 0.5F);
+      const int y = stretch.y + whole_below(ragged_px * stretch.above[i] + 0.5F);
+      const auto disparity_at = [&](int column, int row) __attribute__((always_inline)) {
+        return disparities[std::min(std::max(row, 0), last_y) * width +
+                           std::min(std::max(column, 0), last_x)];
+      };
+      const float here = disparity_at(x, y);
+      const float left = disparity_at(x - 1, y);
+      const float right = disparity_at(x + 1, y);
+      const float over = disparity_at(x, y - 1);
+      const float under = disparity_at(x, y + 1);
+      const float nearest = std::max(here, std::max(std::max(left, right), std::max(over, under)));
+      const float farthest = std::min(here, std::min(std::min(left, right), std::min(over, under)));
+      // A slanted surface has a slope, a step is more than both its sides' slopes.
+      const bool step = nearest - farthest >= step_px && nearest + farthest - 2.0F * here != 0.0F;
+      const float between = farthest + (nearest - farthest) * stretch.between[i];
+      const float beside = stretch.chance[i] < kBetween ? between : here;
+      const float torn = stretch.chance[i] < kNothing ? 0.0F : beside;
+      found[i] = step ? torn : here;
+    }
+    return found;
+  }
+
+  void take_over(const Lanes& measured_m, const Stretch& stretch,
+                 std::vector<float>& depth_m) const {
+    const auto begin = static_cast<std::ptrdiff_t>(index(stretch.x, stretch.y));
+    std::copy_n(measured_m.begin(), stretch.count, depth_m.begin() + begin);
+  }
+
+  /// Takes out of a row what only one camera sees, and what is too faint.
+  void drop_unseen(int y, const std::vector<float>& holes, std::span<float> depth_m) const {
+    const std::size_t begin = index(0, y);
+    // Seen from the right camera a point lies at x - d. Whatever lies right of it in the left image
+    // and left of it in the right one is nearer, and hides it.
+    float leftmost = std::numeric_limits<float>::infinity();
+    for (std::size_t x = depth_m.size(); x-- > 0;) {
+      const float disparity = disparity_[begin + x];
+      const float right_x = static_cast<float>(x) - disparity;
+      const bool hidden = right_x > leftmost + 1.0F || right_x < 0.0F;
+      leftmost = std::min(leftmost, right_x);
+      if (hidden || disparity == 0.0F || lost(seen_->signal[begin + x], holes[x])) {
+        depth_m[x] = 0.0F;
       }
     }
-    if (disparity <= 0) {
-      return 0;
-    }
-    const float correlated = std::sqrt(1.0F - kWhiteShare) * random.noise[column];
-    const float white = std::sqrt(kWhiteShare) * to_normal(scramble(bits));
-    const auto scale = static_cast<float>(options_->depth_noise_scale);
-    disparity += scale * static_cast<float>(options_->depth_subpixel_px) *
-                 disparity_spread(seen_->signal[i]) * (correlated + white);
-    if (scale > 0) {
-      disparity =
-          static_cast<float>(whole_below(kSubpixelSteps * disparity + 0.5F)) / kSubpixelSteps;
-    }
-    const float depth = disparity > 0 ? focal_baseline_ / disparity : 0.0F;
-    const bool in_range = depth >= static_cast<float>(options_->depth_min_m) &&
-                          depth <= static_cast<float>(options_->depth_max_m);
-    return in_range ? depth : 0.0F;
   }
 
   [[nodiscard]] static bool lost(float signal, float field) {
@@ -135,35 +233,6 @@ class Matcher {
     }
     return std::log(std::max(signal, std::numeric_limits<float>::min()) / kLeastSignal) <
            kHoleSpread * field;
-  }
-
-  /// The disparity that a window finds: beside a step it may be the neighbour's, something between,
-  /// or nothing (0).
-  [[nodiscard]] float beside_edges(int x, int y, const RandomRow& random,
-                                   std::uint64_t bits) const {
-    constexpr float kNothing = 0.35F;
-    constexpr float kBetween = 0.5F;
-    const auto column = static_cast<std::size_t>(x);
-    const int seen_x = x + whole_below(kRagged_px * random.aside[column] + 0.5F);
-    const int seen_y = y + whole_below(kRagged_px * random.above[column] + 0.5F);
-    const float disparity = disparity_at(seen_x, seen_y);
-    float nearest = disparity;
-    float farthest = disparity;
-    for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-      const float other = disparity_at(seen_x + dx, seen_y + dy);
-      nearest = std::max(nearest, other);
-      farthest = std::min(farthest, other);
-    }
-    // A slanted surface has a slope, a step is more than both its sides' slopes.
-    if (nearest - farthest < kStep_px || nearest + farthest - 2.0F * disparity == 0.0F) {
-      return disparity;
-    }
-    const float chance = to_unit(bits);
-    if (chance < kNothing) {
-      return 0;
-    }
-    return chance < kBetween ? farthest + (nearest - farthest) * to_unit(scramble(bits + 1))
-                             : disparity;
   }
 
   const InfraredView* seen_;
@@ -182,9 +251,7 @@ class Matcher {
 }  // namespace
 
 float disparity_spread(float signal) noexcept {
-  constexpr float kFaintest = 1e-3F;
-  const float ratio = kFaintSignal / std::max(signal, kFaintest);
-  return std::sqrt(1.0F + ratio * ratio);
+  return spread_of(signal);
 }
 
 std::vector<float> match_stereo(const InfraredView& seen, const CameraIntrinsics& intrinsics,

@@ -67,4 +67,13 @@ inline void aim(RayPacket& packet, std::size_t lane, const Eigen::Vector3f& orig
   packet.ray.dir_z[lane] = direction.z();
 }
 
+/// One lane's direction, and where it ends.
+inline Eigen::Vector3f direction_of(const RayPacket& packet, std::size_t lane) {
+  return {packet.ray.dir_x[lane], packet.ray.dir_y[lane], packet.ray.dir_z[lane]};
+}
+inline Eigen::Vector3f end_of(const RayPacket& packet, std::size_t lane) {
+  return Eigen::Vector3f{packet.ray.org_x[lane], packet.ray.org_y[lane], packet.ray.org_z[lane]} +
+         packet.ray.tfar[lane] * direction_of(packet, lane);
+}
+
 }  // namespace geoflow::simulator

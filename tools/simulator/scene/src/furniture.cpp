@@ -229,7 +229,7 @@ void add_window(Builder builder, float width_m, float luminance_nit, const Furni
 }
 
 void add_skirting(Builder builder, float length_m, int material) {
-  builder.box({0, -0.012F, 0}, {length_m, 0, 0.08F}, material);
+  builder.box({0, -0.01F, 0}, {length_m, 0, 0.08F}, material);  // thinner than a door
 }
 
 }  // namespace geoflow::simulator
