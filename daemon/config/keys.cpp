@@ -26,6 +26,7 @@ void bind_source(SourceConfig& c, std::vector<Key>& keys) {
   keys.push_back({"source.fault_seed", &c.fault_seed, 0, kLargestSeed});
   keys.push_back({"source.realtime", &c.realtime});
   keys.push_back({"source.loop", &c.loop});
+  keys.push_back({"source.camera", &c.camera});
   keys.push_back({"source.legs", &c.legs});
   keys.push_back({"source.imu", &c.imu});
 }
@@ -38,6 +39,19 @@ void bind_topics(drivers::TopicNames& c, std::vector<Key>& keys) {
   keys.push_back({"topics.legs", &c.legs});
   keys.push_back({"topics.odometry", &c.odometry});
   keys.push_back({"topics.base_frame", &c.base_frame});
+}
+
+void bind_d435i(CameraConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"d435i.transport", &c.transport});
+  keys.push_back({"d435i.serial", &c.serial});
+  keys.push_back({"d435i.width", &c.width, 256, 1280});
+  keys.push_back({"d435i.height", &c.height, 100, 800});
+  keys.push_back({"d435i.rate_hz", &c.rate_hz, 6, 90});
+  keys.push_back({"d435i.accel_hz", &c.accel_hz, 63, 400});
+  keys.push_back({"d435i.gyro_hz", &c.gyro_hz, 200, 400});
+  keys.push_back({"d435i.emitter", &c.emitter});
+  keys.push_back({"d435i.laser_power_mw", &c.laser_power_mw, 0, 360});
+  keys.push_back({"d435i.exposure_us", &c.exposure_us, 0, 165000});
 }
 
 void bind_can(drivers::CanLegsOptions& c, std::vector<Key>& keys) {
@@ -158,6 +172,7 @@ std::vector<Key> bind_keys(Config& config) {
   std::vector<Key> keys;
   bind_source(config.source, keys);
   bind_topics(config.topics, keys);
+  bind_d435i(config.d435i, keys);
   bind_can(config.can, keys);
   bind_dds(config.dds, keys);
   bind_synchroniser(config.synchroniser, keys);

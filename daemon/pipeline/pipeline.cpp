@@ -129,11 +129,11 @@ class Pipeline::Implementation {
   }
 
   void replay(const std::stop_token& stop) {
-    const auto played = run_.streams->play(stop);
+    const auto played = run_.play(stop);
     if (!played) {
       log::error("replay", "{}", played.error().message);
     }
-    run_.statistics->counters.rejected.store(run_.streams->camera().health().rejected);
+    run_.statistics->counters.rejected.store(run_.ports().camera.health().rejected);
     source_done_.store(!stop.stop_requested(), std::memory_order_release);
     bells_.sync.ring();
   }

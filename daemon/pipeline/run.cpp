@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,12 +13,15 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/calibration_file.hpp"
 #include "geoflow/drivers/can_legs.hpp"
+#include "geoflow/drivers/d435i.hpp"
 #include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/propagator.hpp"
 #include "geoflow/slam/saved_map.hpp"
@@ -63,6 +67,87 @@ Result<void> open_robot(const Config& config, Run& run) {
     run.calibration.timeshift_cam_imu = {};
   }
   return {};
+}
+
+Result<void> open_recording(const Config& config, Run& run) {
+  if (config.source.replay.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source: neither a recording (replay, --replay DIR) nor a camera is named");
+  }
+  auto streams = drivers::RecordedStreams::open(recording_options(config));
+  if (!streams) {
+    return tl::unexpected{std::move(streams.error())};
+  }
+  run.streams = std::move(*streams);
+  run.calibration = run.streams->calibration();
+  return {};
+}
+
+Result<drivers::D435iOptions> d435i_options(const CameraConfig& config) {
+  drivers::D435iOptions options{.serial = config.serial,
+                                .width = config.width,
+                                .height = config.height,
+                                .rate_hz = config.rate_hz,
+                                .accel_hz = config.accel_hz,
+                                .gyro_hz = config.gyro_hz,
+                                .emitter = config.emitter,
+                                .laser_power_mw = config.laser_power_mw,
+                                .color_as_gray = true};
+  if (config.exposure_us > 0) {
+    options.exposure_us = config.exposure_us;
+  }
+  if (config.transport == "v4l2") {
+    options.transport = drivers::D435iTransport::kV4l2;
+  } else if (config.transport == "libusb") {
+    options.transport = drivers::D435iTransport::kLibusb;
+  } else if (config.transport != "auto") {
+    return fail(ErrorCode::kInvalidArgument,
+                "d435i.transport: '{}' is no way to the camera; there are: auto, v4l2, libusb",
+                config.transport);
+  }
+  return options;
+}
+
+/// What a file says of the robot, on a camera that knows its own intrinsics.
+Result<void> overlay_calibration(const std::filesystem::path& directory, Calibration& calibration) {
+  auto file = drivers::load_calibration(directory);
+  if (!file) {
+    return tl::unexpected{std::move(file.error())};
+  }
+  calibration.T_base_cam = file->T_base_cam;
+  if (file->T_cam_imu) {
+    calibration.T_cam_imu = file->T_cam_imu;
+    calibration.timeshift_cam_imu = file->timeshift_cam_imu;
+  }
+  calibration.imu_noise = file->imu_noise;
+  calibration.source += ", " + file->source;
+  return {};
+}
+
+Result<void> open_camera(const Config& config, Run& run) {
+  if (config.source.camera != "d435i") {
+    return fail(ErrorCode::kInvalidArgument, "source.camera: '{}' is no device; there is: d435i",
+                config.source.camera);
+  }
+  if (!config.source.replay.empty() || !config.source.realtime) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.camera: a device keeps its own pace: source.replay must be empty and "
+                "source.realtime true");
+  }
+  const auto options = d435i_options(config.d435i);
+  if (!options) {
+    return tl::unexpected{options.error()};
+  }
+  auto camera = drivers::D435i::open(*options);
+  if (!camera) {
+    return tl::unexpected{std::move(camera.error())};
+  }
+  run.camera = std::move(*camera);
+  run.calibration = run.camera->calibration();
+  run.calibration.imu_noise.rate_hz = config.d435i.gyro_hz;
+  return config.source.calibration.empty()
+             ? Result<void>{}
+             : overlay_calibration(config.source.calibration, run.calibration);
 }
 
 constexpr std::string_view kCan = "can";
@@ -121,23 +206,35 @@ Result<std::shared_ptr<const slam::StoredMap>> saved_map(const MapConfig& config
 }  // namespace
 
 Ports Run::ports() {
+  if (camera) {
+    return {
+        .camera = camera->camera(), .imu = imu ? imu.get() : &camera->imu(), .legs = legs.get()};
+  }
   return {.camera = streams->camera(),
           .imu = imu ? imu.get() : streams->imu(),
           .legs = legs ? legs.get() : streams->legs()};
 }
 
-Result<Run> open_run(const Config& config) {
-  if (config.source.replay.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "source.replay: no recording is named (--replay DIR)");
+Result<void> Run::play(const std::stop_token& stop) {
+  if (!camera) {
+    return streams->play(stop);
   }
+  camera->run(stop);
+  return {};
+}
+
+HostTime Run::to_recording_time(HostTime t) const {
+  return streams ? streams->to_recording_time(t) : t;
+}
+
+Result<Run> open_run(const Config& config) {
   keep_freed_memory();
   Run run;
-  auto streams = drivers::RecordedStreams::open(recording_options(config));
-  if (!streams) {
-    return tl::unexpected{std::move(streams.error())};
+  auto opened =
+      config.source.camera.empty() ? open_recording(config, run) : open_camera(config, run);
+  if (!opened) {
+    return tl::unexpected{std::move(opened.error())};
   }
-  run.streams = std::move(*streams);
-  run.calibration = run.streams->calibration();
   if (auto devices = open_devices(config, run); !devices) {
     return tl::unexpected{std::move(devices.error())};
   }
@@ -152,8 +249,8 @@ Result<Run> open_run(const Config& config) {
     return tl::unexpected{std::move(core.error())};
   }
   run.core = std::move(*core);
-  if (run.streams->imu() != nullptr) {
-    run.propagator = slam::Propagator::create(run.streams->calibration(), config.slam.switches);
+  if (run.ports().imu != nullptr) {
+    run.propagator = slam::Propagator::create(run.calibration, config.slam.switches);
   }
   return run;
 }

@@ -20,6 +20,7 @@
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/d435i.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
@@ -53,6 +54,30 @@ nlohmann::json to_json(const SourceHealth& health) {
           {"delivered", health.delivered},
           {"rejected", health.rejected},
           {"dropped", health.dropped}};
+}
+
+nlohmann::json to_json(const drivers::D435iStatus& camera) {
+  return {{"streaming", camera.streaming},
+          {"trouble", camera.trouble},
+          {"transport", camera.transport},
+          {"place", camera.place},
+          {"super_speed", camera.super_speed},
+          {"firmware", camera.firmware},
+          {"depth_frames", camera.depth_frames},
+          {"color_frames", camera.color_frames},
+          {"damaged_frames", camera.damaged_frames},
+          {"missed_frames", camera.missed_frames},
+          {"imu_reports", camera.imu_reports},
+          {"imu_unpaired", camera.imu_unpaired},
+          {"stamped_by_arrival", camera.stamped_by_arrival},
+          {"stalls", camera.stalls},
+          {"stream_restarts", camera.stream_restarts},
+          {"camera_restarts", camera.camera_restarts},
+          {"port_resets", camera.port_resets},
+          {"hardware_resets", camera.hardware_resets},
+          {"imu_restarts", camera.imu_restarts},
+          {"losses", camera.losses},
+          {"opens", camera.opens}};
 }
 
 }  // namespace
@@ -119,7 +144,7 @@ void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
 PoseContext Worker::context(HostTime t) const {
   const RunCounters& counters = run_.statistics->counters;
   return {.t_publish = HostClock::now(),
-          .t_recording = run_.streams->to_recording_time(t),
+          .t_recording = run_.to_recording_time(t),
           .clock_flags = clock_flags(config_.source),
           .earlier_resets = earlier_resets_,
           .frames_dropped = counters.color_dropped.load(std::memory_order_relaxed) +
@@ -157,9 +182,14 @@ void Worker::save_map() {
 nlohmann::json Worker::status() const {
   nlohmann::json status = to_json(*run_.statistics);
   status["source"] = {{"path", config_.source.replay.string()},
-                      {"format", run_.streams->info().format},
-                      {"calibration", run_.streams->calibration().source},
+                      {"format", run_.camera ? config_.source.camera : run_.streams->info().format},
+                      {"calibration", run_.calibration.source},
                       {"realtime", config_.source.realtime}};
+  if (run_.camera) {
+    status["health"]["camera"] = to_json(run_.camera->camera().health());
+    status["health"]["imu"] = to_json(run_.camera->imu().health());
+    status["d435i"] = to_json(run_.camera->status());
+  }
   if (run_.legs) {
     status["health"]["legs"] = to_json(run_.legs->health());
   }
@@ -170,6 +200,9 @@ nlohmann::json Worker::status() const {
 }
 
 std::uint32_t Worker::clock_flags(const SourceConfig& source) noexcept {
+  if (!source.camera.empty()) {
+    return 0;
+  }
   return source.realtime ? std::uint32_t{GEOFLOW_CLOCK_REPLAY}
                          : GEOFLOW_CLOCK_REPLAY | GEOFLOW_CLOCK_UNPACED;
 }

@@ -27,11 +27,26 @@ struct SourceConfig {
   std::uint64_t fault_seed = 0;
   bool realtime = true;  ///< at the pace it was recorded; else as fast as it can be worked on
   bool loop = false;     ///< begin again at its end
+  std::string camera{};  ///< `d435i`: camera and IMU are that device; empty: the recording's
   std::string legs{};    ///< `can` or `dds`: from there; empty: from the recording
   std::string imu{};     ///< `dds`: the body's IMU instead of the camera's; empty: the recording's
 };
 
 // NOLINTBEGIN(readability-magic-numbers): each default is named by its member
+/// How a D435i is run (docs/d435i.md).
+struct CameraConfig {
+  std::string transport = "auto";  ///< auto, v4l2 or libusb
+  std::string serial;              ///< what USB shows as serial number; empty: the first one found
+  int width = 640;                 ///< of colour and depth [px]
+  int height = 480;                ///< [px]
+  int rate_hz = 30;
+  int accel_hz = 200;
+  int gyro_hz = 200;
+  bool emitter = true;       ///< the pattern projector
+  int laser_power_mw = 150;  ///< its power
+  int exposure_us = 0;       ///< of depth; 0: automatic
+};
+
 /// The two sockets and what their clients may do.
 struct SocketConfig {
   std::filesystem::path pose = "/run/geoflow/pose.sock";
@@ -60,6 +75,7 @@ struct MapConfig {
 struct Config {
   SourceConfig source;
   drivers::TopicNames topics;
+  CameraConfig d435i;
   drivers::CanLegsOptions can;
   drivers::DdsRobotOptions dds;
   timesync::SynchroniserConfig synchroniser;

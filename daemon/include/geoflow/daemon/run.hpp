@@ -3,16 +3,19 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/drivers/d435i.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/propagator.hpp"
 #include "geoflow/timesync/counters.hpp"
@@ -35,9 +38,10 @@ using PropagatedHandler = std::function<void(const PropagatedPose&)>;
 /// One source with one estimator and what is measured of them: what LockStepRunner and Pipeline
 /// work on.
 struct Run {
-  std::unique_ptr<drivers::RecordedStreams> streams;
-  Calibration calibration{};     ///< the recording's, changed where a device stands in for a sensor
-  std::shared_ptr<Legs> legs{};  ///< a device's, in the place of the recording's; null: none
+  std::unique_ptr<drivers::RecordedStreams> streams;  ///< null: a camera is the source
+  std::unique_ptr<drivers::D435i> camera{};  ///< with its IMU, in the place of a recording; or null
+  Calibration calibration{};     ///< the source's, changed where a device stands in for a sensor
+  std::shared_ptr<Legs> legs{};  ///< a device's, in the place of the source's; null: none
   std::shared_ptr<Imu> imu{};    ///< likewise
   std::unique_ptr<RunStatistics> statistics;
   std::unique_ptr<slam::Core> core;
@@ -48,6 +52,10 @@ struct Run {
 
   /// The recording's ports, but for those that a device stands in for.
   [[nodiscard]] Ports ports();
+  /// Delivers at the source's pace, until a recording ends or it is stopped.
+  [[nodiscard]] Result<void> play(const std::stop_token& stop);
+  /// A time on the recording's own time line; of a device the same.
+  [[nodiscard]] HostTime to_recording_time(HostTime t) const;
 };
 
 /// Opens the configured source and makes an estimator for its calibration, which begins with the
