@@ -7,15 +7,12 @@
 #include <iterator>
 #include <memory>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "geoflow/tools/run.hpp"
-#include "tests/support/data.hpp"
+#include "tools/verb_fixture.hpp"
 
 namespace geoflow::tools {
 
@@ -27,9 +24,9 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-class EvaluateVerbTest : public testing::Test {
+class EvaluateVerbTest : public tests::VerbTest {
  protected:
-  EvaluateVerbTest() {
+  EvaluateVerbTest() : VerbTest{make_evaluate_verb} {
     std::ofstream reference{folder_.path() / "reference.txt"};
     std::ofstream estimate{folder_.path() / "estimate.txt"};
     for (int i = 0; i < 40; ++i) {
@@ -40,36 +37,10 @@ class EvaluateVerbTest : public testing::Test {
     }
   }
 
-  [[nodiscard]] std::string file(const std::string& name) const {
-    return (folder_.path() / name).string();
-  }
-
-  int run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"geoflow", "evaluate"});
-    std::vector<const char*> argv;
-    argv.reserve(arguments.size());
-    for (const std::string& argument : arguments) {
-      argv.push_back(argument.c_str());
-    }
-    std::vector<std::unique_ptr<Verb>> verbs;
-    verbs.push_back(make_evaluate_verb());
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    const int code =
-        run_command("test", std::move(verbs), static_cast<int>(argv.size()), argv.data());
-    out_ = testing::internal::GetCapturedStdout();
-    err_ = testing::internal::GetCapturedStderr();
-    return code;
-  }
-
   [[nodiscard]] std::string content(const std::string& name) const {
     std::ifstream stream{file(name), std::ios::binary};
     return {std::istreambuf_iterator<char>{stream}, {}};
   }
-
-  tests::TemporaryDirectory folder_;
-  std::string out_;
-  std::string err_;
 };
 
 TEST_F(EvaluateVerbTest, PrintsJsonWithItsDocumentedKeys) {

@@ -3,18 +3,15 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "geoflow/slam/saved_map.hpp"
-#include "geoflow/tools/run.hpp"
-#include "tests/support/data.hpp"
 
 #include "slam/storage/small_map.hpp"
+#include "tools/verb_fixture.hpp"
 
 namespace geoflow::tools {
 
@@ -28,35 +25,11 @@ using slam::tests::write_bytes;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-class MapVerbTest : public testing::Test {
+class MapVerbTest : public tests::VerbTest {
  protected:
-  MapVerbTest() { EXPECT_TRUE(slam::save_map(slam::tests::small_map("small"), file("small.map"))); }
-
-  [[nodiscard]] std::string file(const std::string& name) const {
-    return (folder_.path() / name).string();
+  MapVerbTest() : VerbTest{make_map_verb} {
+    EXPECT_TRUE(slam::save_map(slam::tests::small_map("small"), file("small.map")));
   }
-
-  int run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"geoflow", "map"});
-    std::vector<const char*> argv;
-    argv.reserve(arguments.size());
-    for (const std::string& argument : arguments) {
-      argv.push_back(argument.c_str());
-    }
-    std::vector<std::unique_ptr<Verb>> verbs;
-    verbs.push_back(make_map_verb());
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    const int code =
-        run_command("test", std::move(verbs), static_cast<int>(argv.size()), argv.data());
-    out_ = testing::internal::GetCapturedStdout();
-    err_ = testing::internal::GetCapturedStderr();
-    return code;
-  }
-
-  geoflow::tests::TemporaryDirectory folder_;
-  std::string out_;
-  std::string err_;
 };
 
 TEST_F(MapVerbTest, InfoCountsWhatThereIs) {
