@@ -23,7 +23,9 @@ TEST(DeviceCamera, OneThatIsNotThereIsSaidInWords) {
     config.d435i.transport = transport;
     const auto run = open_run(config);
     ASSERT_FALSE(run);
-    EXPECT_FALSE(run.error().message.empty()) << transport;
+    EXPECT_THAT(run.error().message,
+                HasSubstr("no D435i with the serial number 000000000000 is connected"))
+        << transport;
   }
 }
 

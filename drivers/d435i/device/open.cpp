@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/d435i.hpp"
@@ -23,18 +24,26 @@ namespace {
 
 using d435i::Transport;
 
+Error not_connected(const std::string& serial) {
+  return {.code = ErrorCode::kNotFound,
+          .message = fmt::format("no D435i{}{} is connected",
+                                 serial.empty() ? "" : " with the serial number ", serial)};
+}
+
 Result<std::unique_ptr<Transport>> open_by_kernel(const std::string& serial) {
   for (const v4l2::UsbCamera& camera : v4l2::find_cameras(d435i::kVendor, d435i::kProduct)) {
     if (serial.empty() || camera.serial == serial) {
       return d435i::open_v4l2_transport(camera);
     }
   }
-  return fail(ErrorCode::kNotFound, "no D435i{}{} is connected",
-              serial.empty() ? "" : " with the serial number ", serial);
+  return tl::unexpected{not_connected(serial)};
 }
 
 Result<std::unique_ptr<Transport>> open_by_usb(const std::string& serial) {
   return usb::open_device(d435i::kVendor, d435i::kProduct, serial)
+      .map_error([&](Error error) {
+        return error.code == ErrorCode::kNotFound ? not_connected(serial) : std::move(error);
+      })
       .and_then([](std::unique_ptr<usb::Port> port) {
         return d435i::open_usb_transport(std::move(port));
       });
