@@ -311,6 +311,10 @@ std::string describe_modes(const std::vector<VideoMode>& modes, PixelCoding codi
   return all.empty() ? "none" : all;
 }
 
+// Four times its largest, 1920x1080 YUYV: a frame's memory is taken before the first frame comes,
+// so corrupt descriptors must not be able to ask for gigabytes.
+constexpr std::int64_t kLargestFrameBytes = std::int64_t{4} * 1920 * 1080 * 2;
+
 Result<ModeChoice> choose_mode(const UsbDescription& description, const VideoMode& mode) {
   for (const StreamingInterface& stream : description.streams) {
     for (const UvcFormat& format : stream.formats) {
@@ -320,15 +324,21 @@ Result<ModeChoice> choose_mode(const UsbDescription& description, const VideoMod
             frame.height != mode.height || interval == frame.intervals_100ns.end()) {
           continue;
         }
-        const auto pixels = static_cast<std::uint32_t>(mode.width * mode.height);
-        return ModeChoice{
-            .interface = stream.number,
-            .endpoint = stream.endpoint,
-            .format_index = format.index,
-            .frame_index = frame.index,
-            .interval_100ns = *interval,
-            .frame_bytes =
-                pixels * static_cast<std::uint32_t>(format.bits_per_pixel) / kBitsPerByte};
+        const std::int64_t bytes =
+            std::int64_t{frame.width} * frame.height * format.bits_per_pixel / kBitsPerByte;
+        if (bytes > kLargestFrameBytes) {
+          return fail(ErrorCode::kInvalidData,
+                      "format {}, frame {} of the camera's descriptors: {}x{} at {} bits a pixel "
+                      "are {} bytes; no mode of this camera has more than {}",
+                      format.index, frame.index, frame.width, frame.height, format.bits_per_pixel,
+                      bytes, kLargestFrameBytes);
+        }
+        return ModeChoice{.interface = stream.number,
+                          .endpoint = stream.endpoint,
+                          .format_index = format.index,
+                          .frame_index = frame.index,
+                          .interval_100ns = *interval,
+                          .frame_bytes = static_cast<std::uint32_t>(bytes)};
       }
     }
   }

@@ -113,7 +113,7 @@ struct VideoMode {
 [[nodiscard]] std::vector<VideoMode> list_modes(const UsbDescription& description);
 
 /// kNotFound, with the rates and sizes that there are, where the camera has no such mode on this
-/// link.
+/// link; kInvalidData where its descriptors give that mode a size that no such camera has.
 [[nodiscard]] Result<ModeChoice> choose_mode(const UsbDescription& description,
                                              const VideoMode& mode);
 

@@ -92,6 +92,22 @@ TEST(ConfigurationDescriptor, SaysWhichModesAUsb2LinkHas) {
             "60/30/15/6 Hz, 640x480 at 30/15/6 Hz, 1280x720 at 6 Hz");
 }
 
+TEST(ConfigurationDescriptor, AModeOfGigabytesIsRefused) {
+  auto found = parse_configuration(golden_configuration());
+  ASSERT_TRUE(found);
+  UvcFormat& format = found->streams.front().formats.front();
+  UvcFrame& frame = format.frames.front();
+  frame.width = 64896;
+  frame.height = 65055;
+  const auto refused = choose_mode(
+      *found, {format.coding, frame.width, frame.height, rate_of(frame.intervals_100ns.front())});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidData);
+  EXPECT_EQ(refused.error().message,
+            "format 1, frame 1 of the camera's descriptors: 64896x65055 at 16 bits a pixel are "
+            "8443618560 bytes; no mode of this camera has more than 16588800");
+}
+
 TEST(ConfigurationDescriptor, CutAnywhereIsRefusedOrShort) {
   const Bytes whole = golden_configuration();
   std::size_t refused = 0;
