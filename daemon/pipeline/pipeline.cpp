@@ -24,8 +24,8 @@
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/mapping.hpp"
 #include "geoflow/timesync/doorbell.hpp"
-#include "geoflow/timesync/drop_oldest_ring.hpp"
 #include "geoflow/timesync/latest.hpp"
+#include "geoflow/timesync/packet_queue.hpp"
 #include "geoflow/timesync/spsc_ring.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 
@@ -70,7 +70,8 @@ class Pipeline::Implementation {
         queues_{config.pipeline, run.statistics->counters, bells_.sync},
         synchroniser_{config.synchroniser, synchroniser_streams(run)},
         propagation_{run.propagator.get(), measured(std::move(handlers.on_propagated))},
-        packets_{static_cast<std::size_t>(config.pipeline.packet_queue)},
+        packets_{static_cast<std::size_t>(config.pipeline.packet_queue),
+                 config.synchroniser.sample_capacity},
         ports_{run.ports()} {}
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
@@ -249,7 +250,7 @@ class Pipeline::Implementation {
   timesync::Synchroniser synchroniser_;                 // sync
   Propagation propagation_;                             // sync
   timesync::Latest<PoseEstimate> frames_;               // slam -> sync
-  timesync::DropOldestRing<SyncedPacket> packets_;      // sync -> slam
+  timesync::PacketQueue packets_;                       // sync -> slam
   timesync::SpscRing<slam::MappingTask> tasks_{1};      // slam -> map
   timesync::SpscRing<slam::MappingResult> results_{1};  // map -> slam
   std::atomic<bool> source_done_{false};

@@ -86,6 +86,8 @@ THREAD_FILES = (
     "drivers/dds/robot_source.hpp",
     "drivers/d435i/device/device.cpp",  # tells other threads how the camera is, and waits interruptibly while it is away
     "drivers/replay/bag/writer.cpp",  # samples are written from the threads that bring them
+    "timesync/include/geoflow/timesync/packet_queue.hpp",  # gives up the oldest packet but for its samples
+    "timesync/src/packet_queue.cpp",
     "drivers/port.hpp",  # a port's sink is started and stopped while the recording plays
     "drivers/v4l2/iio_sensor.cpp",  # the kernel turns a sensor on for up to two seconds
     "drivers/v4l2/iio_sensor.hpp",
