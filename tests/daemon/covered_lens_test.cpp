@@ -1,9 +1,7 @@
 #include <cstddef>
-#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
-#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -11,36 +9,27 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
-#include "geoflow/tools/trajectory_file.hpp"
 #include "tests/support/data.hpp"
 
 #include "process.hpp"
+#include "simulated_walk.hpp"
 
 /// A walk of which ten seconds are blind.
 namespace geoflow::daemon {
 namespace {
 
+using tests::motion_until;
+using tests::pose_at;
+using tests::read_poses;
 using tests::run_process;
+using tests::simulate_walk;
 
 constexpr double kCoveredS = 4;
 constexpr double kUncoveredS = 14;
 
-Trajectory read(const std::filesystem::path& path) {
-  auto file = tools::read_trajectory(path);
-  EXPECT_TRUE(file) << file.error().message;
-  return file ? std::move(file->poses) : Trajectory{};
-}
-
-/// The first pose at or after so long after the recording's first.
-StampedPose at(const Trajectory& trajectory, double since_start_s) {
-  const HostTime t = trajectory.front().t + from_seconds(since_start_s);
-  const auto found = std::ranges::lower_bound(trajectory, t, {}, &StampedPose::t);
-  return found == trajectory.end() ? trajectory.back() : *found;
-}
-
 double way_m(const Trajectory& trajectory, double from_s, double until_s) {
-  const HostTime t_begin = at(trajectory, from_s).t;
-  const HostTime t_end = at(trajectory, until_s).t;
+  const HostTime t_begin = pose_at(trajectory, from_s).t;
+  const HostTime t_end = pose_at(trajectory, until_s).t;
   double way_m = 0;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
     if (trajectory[i - 1].t >= t_begin && trajectory[i].t <= t_end) {
@@ -52,16 +41,12 @@ double way_m(const Trajectory& trajectory, double from_s, double until_s) {
 
 TEST(CoveredLens, TenBlindSecondsOfWalkingAreBridgedByImuAndLegsAndSaid) {
   const tests::TemporaryDirectory directory;
-  const auto bag = directory.path() / "bag";
+  const auto bag = simulate_walk(directory.path(), 3, 16);
+  ASSERT_FALSE(bag.empty());
   const auto out = directory.path() / "out";
   const auto script = directory.path() / "faults.toml";
   std::ofstream{script} << "[[fault]]\nkind = 'cover'\nstream = 'camera'\nfrom_s = " << kCoveredS
                         << "\nuntil_s = " << kUncoveredS << "\n";
-  const auto simulated =
-      run_process({GEOFLOW_PROGRAM, "simulate", "office", "-o", bag.string(), "--seed", "3",
-                   "--duration", "16", "--set", "camera.width=320", "--set", "camera.height=240"},
-                  directory.path() / "simulate");
-  ASSERT_EQ(simulated.code, 0) << simulated.err;
   const auto replayed = run_process(
       {GEOFLOW_PROGRAM, "replay", bag.string(), "-o", out.string(), "--faults", script.string()},
       directory.path() / "replay");
@@ -78,16 +63,14 @@ TEST(CoveredLens, TenBlindSecondsOfWalkingAreBridgedByImuAndLegsAndSaid) {
                 report["by_status"]["DEGRADED"].get<unsigned>(),
             report["frames"].get<unsigned>());
 
-  const Trajectory live = read(out / "live_base.txt");
-  const Trajectory truth = read(bag / "groundtruth_base.txt");
+  const Trajectory live = read_poses(out / "live_base.txt");
+  const Trajectory truth = read_poses(bag / "groundtruth_base.txt");
   ASSERT_FALSE(live.empty());
   ASSERT_FALSE(truth.empty());
   // From where both stood at first.
   const auto error = [&](double since_start_s) -> Vector3d {
-    const auto moved = [&](const Trajectory& trajectory) {
-      return (trajectory.front().pose.inverse() * at(trajectory, since_start_s).pose).translation();
-    };
-    return moved(live) - moved(truth);
+    return motion_until(live, since_start_s).translation() -
+           motion_until(truth, since_start_s).translation();
   };
   const double blind_way_m = way_m(truth, kCoveredS, kUncoveredS);
   const double drift_m = (error(kUncoveredS) - error(kCoveredS)).norm();

@@ -21,8 +21,7 @@ template <typename Sample>
 void prepend(std::vector<Timed<Sample>>& earlier, std::vector<Timed<Sample>>& later,
              std::size_t capacity) {
   if (!later.empty()) {
-    const auto overlap =
-        std::ranges::lower_bound(earlier, later.front().t, {}, &Timed<Sample>::t);
+    const auto overlap = std::ranges::lower_bound(earlier, later.front().t, {}, &Timed<Sample>::t);
     earlier.erase(overlap, earlier.end());
   }
   earlier.insert(earlier.end(), later.begin(), later.end());
