@@ -1,6 +1,5 @@
 #include "simulated_walk.hpp"
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <utility>

@@ -10,6 +10,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/lock_step_runner.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/synced_packet.hpp"

@@ -4,6 +4,7 @@
 #include <optional>
 #include <random>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -137,7 +138,7 @@ TEST(PacketQueue, AnAbsentSensorStaysAbsent) {
 TEST(PacketQueue, NothingIsMissingBetweenTwoThreads) {
   const std::vector<SyncedPacket> packets = packets_of(20'000);
   PacketQueue queue{2, kPlenty};
-  std::jthread producer{[&] {
+  const std::jthread producer{[&] {
     for (const SyncedPacket& packet : packets) {
       queue.push(packet);
     }
