@@ -22,6 +22,9 @@
 namespace geoflow::drivers::can {
 namespace {
 
+/// Of an FD frame's flags those that are on the wire: newer kernels add CANFD_FDF to each.
+constexpr unsigned kWireFlags = CANFD_BRS | CANFD_ESI;
+
 /// A kernel stamp older than this is not believed: the system's clock was set meanwhile.
 constexpr Duration kOldestStamp = std::chrono::seconds{1};
 
@@ -84,7 +87,7 @@ std::optional<Frame> from_kernel(std::span<const std::byte> bytes) noexcept {
   }
   Frame frame{.error = (raw.can_id & CAN_ERR_FLAG) != 0,
               .fd = fd,
-              .fd_flags = fd ? raw.flags : std::uint8_t{0}};
+              .fd_flags = static_cast<std::uint8_t>(fd ? raw.flags & kWireFlags : 0)};
   frame.extended = !frame.error && (raw.can_id & CAN_EFF_FLAG) != 0;
   frame.remote = (raw.can_id & CAN_RTR_FLAG) != 0;
   frame.id = raw.can_id & (frame.extended || frame.error ? CAN_EFF_MASK : CAN_SFF_MASK);

@@ -4,8 +4,6 @@
 What uvcvideo, hid-sensor-hub, lsusb and v4l2-ctl make of it must be what they make of a real camera, and each image, metadata header
 and IMU sample that comes out of the kernel must be one that the emulator wrote down as sent, in the same order.
 """
-import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -34,20 +32,13 @@ LSUSB = ["bcdUSB 3.20", "bMaxPacketSize0 9", "bcdDevice 50.c7", "wTotalLength 0x
 FRAMES = 15
 
 
-class Emulator:
-    """A running `geoflow emulate d435i`, and what it wrote down as sent."""
+def camera(build, recording, *options):
+    return guest.Emulator(build, recording, "--loop", "--asic-serial", SERIAL, "--sent-log", "/tmp/sent.ndjson", *options)
 
-    def __init__(self, build, recording, *options):
-        self.log = Path("/tmp/sent.ndjson")
-        self.process = subprocess.Popen([build / "bin/geoflow", "emulate", "d435i", "--recording", recording, "--attach",
-                                         "--loop", "--asic-serial", SERIAL, "--sent-log", self.log, *options])
 
-    def sent(self, endpoint):
-        return guest.json_lines(self.log, lambda line: line["endpoint"] == endpoint)
-
-    def stop(self):
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(timeout=60)
+def sent(endpoint):
+    """What the emulator wrote down as sent on an endpoint."""
+    return guest.json_lines(Path("/tmp/sent.ndjson"), lambda line: line["endpoint"] == endpoint)
 
 
 def check_identity():
@@ -70,35 +61,35 @@ def check_monitor():
     guest.check(len(guest.hardware_monitor("/dev/video0", 0x15, 32)) == 256, "and the colour table")
 
 
-def check_images(emulator):
+def check_images():
     for node, fourcc, pixel_bytes, endpoint in (("/dev/video0", "Z16 ", 2, 0x82), ("/dev/video4", "YUYV", 2, 0x84),
                                                 ("/dev/video2", "GREY", 1, 0x83)):
         received = guest.capture(node, fourcc, (640, 480), pixel_bytes, FRAMES)
-        sent = [line["crc32"] for line in emulator.sent(endpoint)]
+        crcs = [line["crc32"] for line in sent(endpoint)]
         guest.check(len(received) == FRAMES, f"{node} gave {FRAMES} frames of {fourcc}", len(received))
-        guest.check(guest.in_order(received, sent), f"each of them is one of the {len(sent)} sent, in their order")
+        guest.check(guest.in_order(received, crcs), f"each of them is one of the {len(crcs)} sent, in their order")
 
 
-def check_metadata(emulator):
+def check_metadata():
     headers = guest.metadata_while_streaming("/dev/video1", "/dev/video0", FRAMES)
-    sent = [bytes.fromhex(line["header"]) for line in emulator.sent(0x82)]
-    found = sum(header in headers for header in sent)
-    guest.check(found >= FRAMES // 2 and len(sent[0]) == 232, "the metadata node gives the headers that were sent, whole", found)
+    those_sent = [bytes.fromhex(line["header"]) for line in sent(0x82)]
+    found = sum(header in headers for header in those_sent)
+    guest.check(found >= FRAMES // 2 and len(those_sent[0]) == 232, "the metadata node gives the headers that were sent, whole", found)
 
 
-def check_imu(emulator):
+def check_imu():
     for name, report, scale in (("accel_3d", 1, 0.009806650), ("gyro_3d", 2, 0.001745329)):
         samples, shown_scale = guest.imu_samples(name, 100)
-        sent = [guest.decode_report(bytes.fromhex(line["report"])) for line in emulator.sent(0x86)]
-        sent = [sample for number, *sample in sent if number == report]
+        reports = [guest.decode_report(bytes.fromhex(line["report"])) for line in sent(0x86)]
+        felt = [tuple(sample) for number, *sample in reports if number == report]
         guest.check(abs(shown_scale - scale) < 1e-8, f"{name} has the scale of a real camera", shown_scale)
         guest.check(len(samples) == 100, f"{name} gave 100 samples", len(samples))
-        guest.check(guest.in_order(samples, [tuple(sample) for sample in sent]),
-                    f"each of them is one of the {len(sent)} sent, in their order", samples[:2], sent[:2])
+        guest.check(guest.in_order(samples, felt), f"each of them is one of the {len(felt)} sent, in their order",
+                    samples[:2], felt[:2])
 
 
 def check_unplugging(build, recording):
-    emulator = Emulator(build, recording, "--fault", "unplug@1+2")
+    emulator = camera(build, recording, "--fault", "unplug@1+2")
     guest.check(guest.wait_for("/dev/video5", 60), "plugged in again, the nodes are back")
     subprocess.run(["timeout", "20", "v4l2-ctl", "-d", "/dev/video0", "--stream-mmap", "--stream-count=300"], check=False,
                    capture_output=True)
@@ -110,20 +101,16 @@ def check_unplugging(build, recording):
 def main():
     build, data = Path(sys.argv[1]), Path(sys.argv[2])
     recording = data / "office"
-    guest.load("vhci-hcd", "usbhid", "uvcvideo", "hid-sensor-hub", "hid-sensor-accel-3d", "hid-sensor-gyro-3d")
-    # Kernels before 6.3 know the metadata's layout of other cameras of the family only.
-    Path("/sys/bus/usb/drivers/uvcvideo/new_id").write_text("8086 0b3a 0e 8086 0b03", encoding="ascii")
-    emulator = Emulator(build, recording)
-    guest.check(guest.wait_for("/dev/video5", 120), "uvcvideo makes six video nodes")
-    guest.check(guest.wait_for("/sys/bus/iio/devices/iio:device1", 30), "and hid-sensor-hub two IMU devices")
+    guest.load_camera_drivers()
+    emulator = camera(build, recording)
+    guest.check(emulator.plugged_in(), "uvcvideo makes six video nodes, and hid-sensor-hub two IMU devices")
     check_identity()
     check_monitor()
-    check_images(emulator)
-    check_metadata(emulator)
-    check_imu(emulator)
+    check_images()
+    check_metadata()
+    check_imu()
     emulator.stop()
     guest.check(guest.wait_for("/dev/video0", 10, there=False), "without the emulator the nodes are gone")
-    os.remove(emulator.log)
     check_unplugging(build, recording)
     return guest.summary()
 

@@ -5,6 +5,8 @@ import json
 import os
 import re
 import select
+import signal
+import socket
 import struct
 import subprocess
 import time
@@ -28,6 +30,79 @@ def summary():
 
 def load(*modules):
     subprocess.run(["modprobe", "-a", *modules], check=True)
+
+
+def load_camera_drivers():
+    load("vhci-hcd", "usbhid", "uvcvideo", "hid-sensor-hub", "hid-sensor-accel-3d", "hid-sensor-gyro-3d")
+    # Kernels before 6.3 know the metadata's layout of other cameras of the family only.
+    Path("/sys/bus/usb/drivers/uvcvideo/new_id").write_text("8086 0b3a 0e 8086 0b03", encoding="ascii")
+
+
+def raise_can_bus(name):
+    load("can-raw", "vcan")
+    subprocess.run(["ip", "link", "add", name, "type", "vcan"], check=True)
+    subprocess.run(["ip", "link", "set", name, "up"], check=True)
+
+
+class Process:
+    """A program of the build that runs until stop(), and the JSON lines that it says."""
+
+    def __init__(self, name, *command):
+        self.output = Path(f"/tmp/{name}.ndjson")
+        with self.output.open("wb") as output:
+            self.process = subprocess.Popen([str(part) for part in command], stdout=output)
+
+    def said(self, key):
+        """Newest value of a key that a line had; none: no line had it."""
+        lines = json_lines(self.output, lambda line: key in line)
+        return lines[-1][key] if lines else None
+
+    def wait_until_said(self, key, seconds):
+        end = time.monotonic() + seconds
+        while (value := self.said(key)) is None and time.monotonic() < end and self.process.poll() is None:
+            time.sleep(0.05)
+        return value
+
+    def stop(self):
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(timeout=60)
+
+
+class Emulator(Process):
+    """A running `geoflow emulate d435i`."""
+
+    def __init__(self, build, recording, *options):
+        super().__init__("emulator", build / "bin/geoflow", "emulate", "d435i", "--recording", recording, "--attach", "--json",
+                         *options)
+
+    @staticmethod
+    def plugged_in():
+        return wait_for("/dev/video5", 120) and wait_for("/sys/bus/iio/devices/iio:device1", 30)
+
+
+class Daemon(Process):
+    """A running geoflowd, its sockets in /tmp."""
+
+    POSES, CONTROL = "/tmp/pose.sock", "/tmp/ctl.sock"
+
+    def __init__(self, build, **keys):
+        settings = [word for key, value in keys.items() for word in ("--set", f"{key.replace('__', '.')}={value}")]
+        super().__init__("geoflowd", build / "bin/geoflowd", "--pose-socket", self.POSES, "--control-socket", self.CONTROL,
+                         *settings)
+
+    def status(self):
+        """What it says on its control socket, {} while it does not answer."""
+        with socket.socket(socket.AF_UNIX) as connection:
+            try:
+                connection.connect(self.CONTROL)
+                connection.sendall(b'{"cmd":"status"}\n')
+                with connection.makefile(encoding="utf-8") as lines:
+                    for line in lines:
+                        if (reply := json.loads(line)).get("reply") == "status":
+                            return reply["status"]
+            except OSError:
+                pass
+        return {}
 
 
 def wait_for(path, seconds, there=True):
