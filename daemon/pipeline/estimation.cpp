@@ -27,6 +27,7 @@ timesync::SynchroniserStreams synchroniser_streams(Run& run) {
                                           .timeshift_cam_imu = run.calibration.timeshift_cam_imu};
   if (ports.imu != nullptr) {
     described.imu = ports.imu->stamps();
+    described.imu_on_camera_clock = run.camera && !run.imu;
   }
   if (ports.legs != nullptr) {
     described.legs = ports.legs->stamps();

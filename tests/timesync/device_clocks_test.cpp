@@ -32,10 +32,12 @@ constexpr double kCameraJitterNs = 0.5 * kMsInNs;
 /// Two devices and the packets that come of them.
 class Rig {
  public:
-  Rig()
-      : random_{geoflow::tests::test_seed(11)}, sync_{{}, {.camera = kWrapping, .imu = kWrapping}} {
+  /// `one_clock`: both devices are stamped by one, and it is known.
+  explicit Rig(bool one_clock = false)
+      : random_{geoflow::tests::test_seed(11)},
+        sync_{{}, {.camera = kWrapping, .imu = kWrapping, .imu_on_camera_clock = one_clock}} {
     camera = draw_clock(random_, true);
-    imu = draw_clock(random_, true);
+    imu = one_clock ? camera : draw_clock(random_, true);
   }
 
   /// Runs [begin_s, end_s) in order of arrival (delays are under a period).
@@ -47,7 +49,7 @@ class Rig {
                       {}});
       for (; next_frame_ns_ <= t_ns; next_frame_ns_ += kFrameNs) {
         const Duration stamp{camera.stamp_ns(static_cast<double>(next_frame_ns_))};
-        const HostTime arrival = arrive(next_frame_ns_, camera_jitter_);
+        const HostTime arrival = arrive(next_frame_ns_, camera_jitter_) + camera_delay;
         truths.push_back(kHostStartNs + next_frame_ns_);
         sync_.push_depth({DeviceTime<CameraClock>{stamp}, arrival, DepthFrame{tiny_frame()}});
         sync_.push_color({DeviceTime<CameraClock>{stamp}, arrival, ColorFrame{tiny_frame()}});
@@ -65,6 +67,7 @@ class Rig {
 
   RandomClock camera;
   RandomClock imu;
+  Duration camera_delay{};  ///< the least one, under a period
   std::vector<SyncedPacket> packets;
   std::vector<bool> has_depth;
   std::vector<std::int64_t> truths;  // of the frames
@@ -101,6 +104,35 @@ TEST(DeviceClocks, FramesPairAndWindowsAreWholeOnUnrelatedClocks) {
   EXPECT_EQ(rig.counters().depth_missing, 0U);
   EXPECT_EQ(rig.counters().camera_clock.jumps, 0U);
   EXPECT_EQ(rig.counters().imu.late, 0U);
+}
+
+TEST(DeviceClocks, OnOneClockTheImuTellsHowLateImagesAre) {
+  Rig rig{true};
+  rig.camera_delay = from_ms(28);
+  rig.run(0, 60);
+  ASSERT_GE(rig.packets.size() + 2, rig.truths.size());
+  for (std::size_t i = 150; i < rig.packets.size(); ++i) {
+    const std::int64_t placed_ns = rig.packets[i].t.time_since_epoch().count();
+    ASSERT_LE(std::abs(static_cast<double>(placed_ns - rig.truths[i])), kCameraJitterNs) << i;
+    EXPECT_GE(rig.packets[i].imu.back().t, rig.packets[i].t) << i;
+  }
+  EXPECT_EQ(rig.counters().depth_missing, 0U);
+  EXPECT_EQ(rig.counters().color.late, 0U);
+}
+
+TEST(DeviceClocks, OnOneClockThatRestartsTheLagIsKept) {
+  Rig rig{true};
+  rig.camera_delay = from_ms(28);
+  rig.run(0, 30);
+  rig.camera.offset_ns += kWrap32Us / 3;
+  rig.imu.offset_ns = rig.camera.offset_ns;
+  rig.run(30, 60);
+  for (std::size_t i = 1; i < rig.packets.size(); ++i) {
+    ASSERT_LT(rig.packets[i - 1].t, rig.packets[i].t);
+  }
+  const auto last_error_ns =
+      rig.packets.back().t.time_since_epoch().count() - rig.truths[rig.truths.size() - 1];
+  EXPECT_LE(std::abs(static_cast<double>(last_error_ns)), static_cast<double>(2 * kFrameNs));
 }
 
 TEST(DeviceClocks, ACameraThatRestartsGoesOnAndIsCounted) {

@@ -1,6 +1,7 @@
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 
 #include "geoflow/hal/ports.hpp"
@@ -25,6 +26,10 @@ Liveness liveness(const SynchroniserConfig& config, bool expected) {
 Synchroniser::Synchroniser(const SynchroniserConfig& config, const SynchroniserStreams& streams)
     : config_{config},
       timeshift_cam_imu_{streams.timeshift_cam_imu},
+      one_clock_{streams.imu_on_camera_clock && streams.imu &&
+                 streams.imu->domain == StampDomain::kDevice &&
+                 streams.camera.domain == StampDomain::kDevice},
+      camera_lag_{},
       camera_clock_{streams.camera, config.clock},
       imu_clock_{streams.imu.value_or(StampInfo{}), config.clock},
       leg_clock_{streams.legs.value_or(StampInfo{}), config.clock},
@@ -34,16 +39,35 @@ Synchroniser::Synchroniser(const SynchroniserConfig& config, const SynchroniserS
       legs_{config.sample_capacity, config.max_step, liveness(config, false)},
       body_velocity_{config.sample_capacity, config.max_step, liveness(config, false)} {}
 
+/// A line lies under its stream's arrivals, so it contains that stream's least delay: for an image
+/// that of exposure, readout and transfer. Of two lines of one clock the earlier is nearer the
+/// truth.
+Duration Synchroniser::camera_lag(DeviceTime<CameraClock> t_device) noexcept {
+  constexpr Duration kLargest = std::chrono::milliseconds{300};  // an exposure, and its way here
+  constexpr Duration kStep = std::chrono::milliseconds{1};
+  if (!one_clock_ || !camera_clock_.locked() || !imu_clock_.locked()) {
+    return camera_lag_;
+  }
+  const HostTime by_camera = camera_clock_.to_host(t_device).t;
+  const HostTime by_imu = imu_clock_.to_host(DeviceTime<ImuClock>{t_device.time_since_epoch()}).t;
+  const Duration lag = by_camera - by_imu;
+  if (lag <= kLargest && lag >= -kLargest) {  // else one of them has not seen the clock's jump yet
+    const Duration wanted = std::max(lag, Duration::zero());
+    camera_lag_ += std::clamp(wanted - camera_lag_, -kStep, kStep);
+  }
+  return camera_lag_;
+}
+
 void Synchroniser::push_color(const Arrival<CameraClock, ColorFrame>& frame) {
   note_arrival(frame.t_arrival);
   note_color(frame.t_arrival);
-  color_.push(frame, camera_clock_, Duration::zero(), counters_.color);
+  color_.push(frame, camera_clock_, camera_lag(frame.t_device), counters_.color);
   counters_.camera_clock = camera_clock_.counters();
 }
 
 void Synchroniser::push_depth(const Arrival<CameraClock, DepthFrame>& frame) {
   note_arrival(frame.t_arrival);
-  depth_.push(frame, camera_clock_, Duration::zero(), counters_.depth);
+  depth_.push(frame, camera_clock_, camera_lag(frame.t_device), counters_.depth);
   counters_.camera_clock = camera_clock_.counters();
 }
 

@@ -52,6 +52,10 @@ class Synchroniser {
   [[nodiscard]] const SynchroniserCounters& counters() const noexcept { return counters_; }
 
  private:
+  /// What images are later by than IMU samples of the same clock, from `t_device` of a frame that
+  /// the camera's clock model knows; zero where they do not share one. It changes by little from
+  /// call to call, so that frames stay in order.
+  [[nodiscard]] Duration camera_lag(DeviceTime<CameraClock> t_device) noexcept;
   void note_arrival(HostTime t_arrival) noexcept;
   void note_color(HostTime t_arrival) noexcept;
   [[nodiscard]] std::optional<HostTime> next_color() const;
@@ -63,6 +67,8 @@ class Synchroniser {
 
   SynchroniserConfig config_;
   Duration timeshift_cam_imu_;
+  bool one_clock_;       // of camera and IMU
+  Duration camera_lag_;  // see camera_lag()
   ClockModel<CameraClock> camera_clock_;
   ClockModel<ImuClock> imu_clock_;
   ClockModel<LegClock> leg_clock_;

@@ -35,8 +35,11 @@ struct SynchroniserConfig {
 
 /// Which streams there are, and how they are stamped.
 struct SynchroniserStreams {
-  StampInfo camera{};               ///< colour and depth: one clock
-  std::optional<StampInfo> imu{};   ///< none: there is no IMU, and it is not waited for
+  StampInfo camera{};              ///< colour and depth: one clock
+  std::optional<StampInfo> imu{};  ///< none: there is no IMU, and it is not waited for
+  /// Both are stamped by one device clock: what an image is later than an IMU sample on its way to
+  /// the host can then be told, and is taken off.
+  bool imu_on_camera_clock = false;
   std::optional<StampInfo> legs{};  ///< legs and body velocity: one clock; waited for once heard
   Duration
       timeshift_cam_imu{};  ///< t_imu = t_cam + this; IMU samples leave on the camera's time line
