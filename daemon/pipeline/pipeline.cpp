@@ -14,6 +14,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
