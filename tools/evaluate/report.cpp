@@ -1,13 +1,16 @@
 #include "evaluate/report.hpp"
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
 #include <fmt/core.h>
 
+#include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/evaluate/alignment.hpp"
+#include "geoflow/tools/evaluate/consistency.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
 #include "geoflow/tools/evaluate/statistics.hpp"
@@ -60,6 +63,19 @@ void print_report(Console& console, const Evaluation& evaluation,
     console.line("{}", relative_title(evaluation, options.relative));
     print_row(console, "  translation [m]", evaluation.rpe.translation_m);
     print_row(console, "  rotation [deg]", evaluation.rpe.rotation_deg);
+  }
+}
+
+void print_consistency(Console& console, const Consistency& consistency) {
+  console.line("{:<22} {:>10} {:>10} {:>12} {:>10} {:>10}", "NEES (1: honest)", "estimates",
+               "position", "orientation", "pose", "within 95%");
+  for (std::size_t i = 0; i < consistency.by_status.size(); ++i) {
+    const Nees& nees = consistency.by_status.at(i);
+    if (nees.estimates > 0) {
+      console.line("  {:<20} {:>10} {:>10.3f} {:>12.3f} {:>10.3f} {:>8.1f} %",
+                   to_string(static_cast<TrackingStatus>(i)), nees.estimates, nees.position,
+                   nees.orientation, nees.pose, kPercent * nees.within_95);
+    }
   }
 }
 

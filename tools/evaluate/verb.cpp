@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -16,11 +17,14 @@
 
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/log.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
+#include "geoflow/tools/estimate_table.hpp"
 #include "geoflow/tools/evaluate/alignment.hpp"
 #include "geoflow/tools/evaluate/association.hpp"
+#include "geoflow/tools/evaluate/consistency.hpp"
 #include "geoflow/tools/evaluate/evaluation.hpp"
 #include "geoflow/tools/evaluate/pose_errors.hpp"
 #include "geoflow/tools/plot.hpp"
@@ -59,6 +63,8 @@ class EvaluateVerb final : public Verb {
   [[nodiscard]] EvaluationOptions options() const;
   [[nodiscard]] Result<Evaluation> measure(Console& console,
                                            const EvaluationOptions& options) const;
+  [[nodiscard]] Result<std::optional<Consistency>> measure_consistency(
+      const TrajectoryFile& reference, const EvaluationOptions& options) const;
   [[nodiscard]] Result<void> write_files(const Evaluation& evaluation,
                                          const EvaluationOptions& options) const;
   [[nodiscard]] ExitCode judge(const Evaluation& evaluation) const;
@@ -70,6 +76,7 @@ class EvaluateVerb final : public Verb {
   double offset_s_ = 0;
   double max_gap_s_ = to_seconds(CoverageOptions{}.max_gap);
   EvaluationOptions options_;
+  std::string estimates_;
   std::string plot_;
   std::string table_;
   std::optional<double> max_ate_m_;
@@ -86,6 +93,8 @@ std::string_view EvaluateVerb::examples() const {
          "  geoflow evaluate estimate.txt truth.csv --align sim3 --max-difference 0.02 --offset "
          "-0.1\n"
          "      a monocular estimate whose clock is 0.1 s ahead\n"
+         "  geoflow evaluate out/live_base.txt groundtruth_base.txt --estimates out/estimates.csv\n"
+         "      and whether the errors are what the covariances say\n"
          "  geoflow evaluate out/final_camera.txt groundtruth.txt --max-ate 0.05 --json\n"
          "      for scripts: exit code 1 where the ATE is above 0.05 m";
 }
@@ -125,6 +134,9 @@ void EvaluateVerb::declare(CLI::App& command) {
       ->capture_default_str();
   command.add_option("--correct-within", options_.coverage.max_error_m,
                      "Also say for how much of the time the position was within this [m]");
+  command.add_option("--estimates", estimates_,
+                     "Also say how honest the covariances in this estimates.csv of geoflow replay "
+                     "are (NEES)");
   command.add_option("--plot", plot_, "Draw paths and errors to this file, .png or .svg");
   command.add_option("--table", table_, "Write every pose's error to this file as CSV");
   command.add_option("--max-ate", max_ate_m_,
@@ -169,6 +181,10 @@ Result<Evaluation> EvaluateVerb::measure(Console& console, const EvaluationOptio
   if (!reference) {
     return tl::unexpected{reference.error()};
   }
+  const auto consistency = measure_consistency(*reference, options);
+  if (!consistency) {
+    return tl::unexpected{consistency.error()};
+  }
   auto evaluation = evaluate(*estimate, *reference, options);
   if (evaluation) {
     nlohmann::json object = to_json(*evaluation, options);
@@ -178,12 +194,30 @@ Result<Evaluation> EvaluateVerb::measure(Console& console, const EvaluationOptio
     object["reference"] = {{"path", reference_},
                            {"format", to_string(reference->format)},
                            {"poses", reference->poses.size()}};
+    if (*consistency) {
+      object["consistency"] = to_json(**consistency);
+    }
     console.object(object);
     console.line("estimate   {} ({} poses)", estimate_, estimate->poses.size());
     console.line("reference  {} ({} poses)", reference_, reference->poses.size());
     print_report(console, *evaluation, options);
+    if (*consistency) {
+      print_consistency(console, **consistency);
+    }
   }
   return evaluation;
+}
+
+Result<std::optional<Consistency>> EvaluateVerb::measure_consistency(
+    const TrajectoryFile& reference, const EvaluationOptions& options) const {
+  if (estimates_.empty()) {
+    return std::nullopt;
+  }
+  return read_estimates(estimates_)
+      .and_then([&](const std::vector<PoseEstimate>& estimates) {
+        return consistency(estimates, reference.poses, options.association);
+      })
+      .map([](const Consistency& found) { return std::optional{found}; });
 }
 
 Result<void> EvaluateVerb::write_files(const Evaluation& evaluation,

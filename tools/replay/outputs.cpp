@@ -15,6 +15,7 @@
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/trajectory.hpp"
+#include "geoflow/tools/estimate_table.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 #include "replay/session.hpp"
@@ -81,6 +82,12 @@ Result<void> write_outputs(const fs::path& directory, const ReplayResult& result
     if (!written) {
       return written;
     }
+  }
+  auto estimates = replace_file(directory / "estimates.csv", [&](const fs::path& path) {
+    return write_estimates(path, result.estimates);
+  });
+  if (!estimates) {
+    return estimates;
   }
   constexpr int kIndent = 2;
   const std::string text =

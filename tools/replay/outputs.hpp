@@ -14,8 +14,8 @@ namespace geoflow::tools {
 /// any work is done.
 [[nodiscard]] Result<void> prepare_output(const std::filesystem::path& directory);
 
-/// Writes live_camera.txt, live_base.txt, final_camera.txt, final_base.txt and report.json. Each
-/// file is replaced as a whole or not at all.
+/// Writes live_camera.txt, live_base.txt, final_camera.txt, final_base.txt, estimates.csv and
+/// report.json. Each file is replaced as a whole or not at all.
 [[nodiscard]] Result<void> write_outputs(const std::filesystem::path& directory,
                                          const ReplayResult& result, const nlohmann::json& report);
 

@@ -52,6 +52,7 @@ Result<ReplayResult> replay(const daemon::Config& config, const ReplayProgress& 
   const auto take = [&](const SyncedPacket& /*packet*/, const PoseEstimate& estimate) {
     result.first_pose = frames == 0 ? HostClock::now() - begin : result.first_pose;
     if (daemon::has_pose(estimate.status)) {
+      result.estimates.push_back(estimate);
       result.live_base.push_back({estimate.t, estimate.T_map_odom * estimate.T_odom_base});
     }
     if (!progress(++frames, total)) {

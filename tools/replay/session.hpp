@@ -7,6 +7,7 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
@@ -17,11 +18,12 @@ namespace geoflow::tools {
 /// recording's own.
 struct ReplayResult {
   daemon::Run run;
-  Trajectory live_base;   ///< T_map_base of each frame as the socket would have said it at its time
-  Trajectory imu_base;    ///< the same at each IMU sample, if asked for
-  Trajectory final_base;  ///< after all optimisation
-  Duration elapsed{};     ///< from the opened recording to the last estimate
-  Duration first_pose{};  ///< from the beginning of the opening to the first estimate
+  Trajectory live_base;  ///< T_map_base of each frame as the socket would have said it at its time
+  std::vector<PoseEstimate> estimates;  ///< of each frame that has a pose, likewise
+  Trajectory imu_base;                  ///< the same at each IMU sample, if asked for
+  Trajectory final_base;                ///< after all optimisation
+  Duration elapsed{};                   ///< from the opened recording to the last estimate
+  Duration first_pose{};                ///< from the beginning of the opening to the first estimate
   bool interrupted = false;
 };
 

@@ -139,7 +139,8 @@ class ReplayVerb final : public Verb {
     }
     console.line("calibration: {}", result.run.streams->calibration().source);
     console.line(
-        "written to {}: live_camera.txt live_base.txt final_camera.txt final_base.txt report.json",
+        "written to {}: live_camera.txt live_base.txt final_camera.txt final_base.txt "
+        "estimates.csv report.json",
         output_);
     return result.interrupted ? ExitCode::kInterrupted : ExitCode::kOk;
   }

@@ -1,16 +1,25 @@
 #include "geoflow/tools/verb.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <ios>
 #include <iterator>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+
+#include "geoflow/hal/geometry.hpp"
+#include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/time.hpp"
+#include "geoflow/tools/estimate_table.hpp"
 
 #include "tools/verb_fixture.hpp"
 
@@ -58,6 +67,34 @@ TEST_F(EvaluateVerbTest, PrintsJsonWithItsDocumentedKeys) {
   EXPECT_EQ(json.at("alignment").at("kind"), "none");
   EXPECT_EQ(json.at("correct_rate").at("rate"), 1.0);
   EXPECT_NEAR(json.at("path_m").at("reference").get<double>(), 16.06, 0.5);
+}
+
+TEST_F(EvaluateVerbTest, SaysHowHonestCovariancesAre) {
+  std::vector<PoseEstimate> estimates(40);
+  for (int i = 0; i < 40; ++i) {
+    PoseEstimate& estimate = estimates.at(static_cast<std::size_t>(i));
+    estimate.t = HostTime{std::chrono::milliseconds{100 * i}};
+    // 30 mm off along x but for the first pose, where 10 mm are expected.
+    estimate.T_odom_base = SE3{Eigen::Quaterniond::Identity(),
+                               Vector3d{0.1 * i + (i > 0 ? 0.03 : 0), 0.01 * i * i, 0}};
+    estimate.covariance.diagonal().setConstant(1e-4);
+    estimate.status = i < 20 ? TrackingStatus::kTracking : TrackingStatus::kDegraded;
+  }
+  ASSERT_TRUE(write_estimates(file("estimates.csv"), estimates));
+  const std::vector<std::string> arguments{file("estimate.txt"), file("reference.txt"),
+                                           "--estimates", file("estimates.csv")};
+  std::vector<std::string> as_json = arguments;
+  as_json.emplace_back("--json");
+  ASSERT_EQ(run(as_json), 0) << err_;
+  const auto rows = nlohmann::json::parse(out_).at("consistency");
+  EXPECT_EQ(rows.at("TRACKING").at("estimates"), 19);
+  EXPECT_EQ(rows.at("DEGRADED").at("estimates"), 20);
+  EXPECT_NEAR(rows.at("DEGRADED").at("nees_position").get<double>(), 3, 1e-3);
+  EXPECT_NEAR(rows.at("DEGRADED").at("nees_orientation").get<double>(), 0, 1e-9);
+  EXPECT_NEAR(rows.at("DEGRADED").at("nees_pose").get<double>(), 1.5, 1e-3);
+  EXPECT_EQ(rows.at("DEGRADED").at("within_95"), 1.0);
+  ASSERT_EQ(run(arguments), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("NEES"));
 }
 
 TEST_F(EvaluateVerbTest, PrintsATable) {
