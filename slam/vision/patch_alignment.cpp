@@ -195,7 +195,8 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
   constexpr int kIterations = 20;
   constexpr double kConvergedPx = 0.02;
   constexpr double kStrayPx = 2;
-  constexpr double kAlike = 0.8;  // correlation
+  constexpr double kAlike = 0.5;  // correlation: less is another patch
+  constexpr double kCertainPx = 0.3;
   constexpr double kLeastInformation =
       0.01;  // of the weaker direction [1/px^2]: 0.1 of all contrast a pixel
   const auto wide = warped(reference, warp);
@@ -229,7 +230,11 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
     }
     if (step.norm() < kConvergedPx) {
       const double correlation = static_cast<double>((seen->gray * sought.gray).sum());
-      return correlation > kAlike ? std::optional{pixel} : std::nullopt;
+      // A camera's noise and blur cost correlation but not the place: what counts is how well the
+      // differences that are left let it be told (two unit patches differ by 2 - 2 correlation).
+      const double variance_px2 = 2 * (1 - correlation) / (kSide * kSide) / weaker;
+      return correlation > kAlike && variance_px2 < kCertainPx * kCertainPx ? std::optional{pixel}
+                                                                            : std::nullopt;
     }
   }
   return std::nullopt;

@@ -32,7 +32,8 @@ struct PatchWarp {
 /// Lucas-Kanade prefers, on a floor seen at a slant, the far and finer texture of its window, which
 /// moves less: the motion comes out too small, and errors add up from frame to frame.
 /// Source: Baker and Matthews, "Lucas-Kanade 20 years on", IJCV 2004 (inverse compositional).
-/// None where the patch leaves an image, strays from `start`, or does not look alike. Pure.
+/// None where the patch leaves an image, strays from `start`, looks like another one, or where what
+/// is left of differences says that its place is uncertain. Pure.
 [[nodiscard]] std::optional<Vector2d> align_patch(const ImagePyramid& reference,
                                                   const PatchWarp& warp,
                                                   const ImagePyramid& current,
