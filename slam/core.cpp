@@ -129,6 +129,10 @@ class Core::Impl {
     }
   }
 
+  [[nodiscard]] Readout readout() const {
+    return {.mean_s = tracker_.readout().seconds(), .sigma_s = tracker_.readout().sigma()};
+  }
+
   [[nodiscard]] Trajectory final_trajectory() const {
     return frames_.trajectory(map_, T_base_cam_);
   }
@@ -381,6 +385,9 @@ void Core::apply(const MappingResult& result) {
 }
 std::shared_ptr<const StoredMap> Core::snapshot() const {
   return impl_->snapshot();
+}
+Core::Readout Core::readout() const {
+  return impl_->readout();
 }
 Trajectory Core::final_trajectory() const {
   return impl_->final_trajectory();

@@ -132,12 +132,13 @@ void bind_mapping(slam::MappingConfig& c, std::vector<Key>& keys) {
 
 void bind_slam(slam::Config& c, std::vector<Key>& keys) {
   auto& [switches, features, flow, pose, keyframes, mapping] = c;
-  auto& [optical_flow, gicp, depth_to_map, imu, legs, loop_closing] = switches;
+  auto& [optical_flow, gicp, depth_to_map, imu, legs, rolling_shutter, loop_closing] = switches;
   keys.push_back({"slam.switches.optical_flow", &optical_flow});
   keys.push_back({"slam.switches.gicp", &gicp});
   keys.push_back({"slam.switches.depth_to_map", &depth_to_map});
   keys.push_back({"slam.switches.imu", &imu});
   keys.push_back({"slam.switches.legs", &legs});
+  keys.push_back({"slam.switches.rolling_shutter", &rolling_shutter});
   keys.push_back({"slam.switches.loop_closing", &loop_closing});
   bind_features(features, keys);
   bind_flow(flow, keys);

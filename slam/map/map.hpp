@@ -15,6 +15,7 @@
 #include "map/stored_cloud.hpp"
 #include "place/place_index.hpp"
 #include "vision/orb_features.hpp"
+#include "vision/row_time.hpp"
 
 /// What has been seen, and from where. Value types, thread-compatible; odom is the map's frame.
 namespace geoflow::slam {
@@ -57,6 +58,7 @@ struct Keyframe {
   std::shared_ptr<const StoredCloud> stored_cloud{};  ///< the same in a file; null: in none
   std::shared_ptr<const PlaceView> place;             ///< null until describe() gives it
   std::shared_ptr<const ImagePyramid> pyramid;        ///< null where it was let go
+  RowMotion rows{};                                   ///< while the pyramid's image was read out
   std::vector<PointId> points;                        ///< that it observes
 };
 

@@ -80,6 +80,7 @@ KeyframeId MapBuilder::insert(Map& map, Frame& frame, const Matrix6d& covariance
                                           .cloud = frame.cloud,
                                           .place = frame.place,
                                           .pyramid = frame.pyramid,
+                                          .rows = frame.rows,
                                           .points = {}});
   observe_features(map, id, frame);
   add_features(map, id, frame);
@@ -157,10 +158,8 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   const cv::Size image = frame.pyramid->image().size();
   for (const OrbFeature& feature :
        choose_new(frame.place->features, taken, image, config_.features)) {
-    added.push_back({.raw = feature.pixel,
-                     .ideal = camera_.undistort(feature.pixel),
-                     .depth_m = frame.depth_at(feature.pixel),
-                     .descriptor = feature.descriptor});
+    added.push_back(frame.feature_at(feature.pixel, camera_));
+    added.back().descriptor = feature.descriptor;
   }
   const auto points = find_points(map, frame, added, kSearchRadiusPx, camera_);
   for (std::size_t j = 0; j < added.size(); ++j) {

@@ -13,6 +13,7 @@
 #include "map/map.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/place_view.hpp"
+#include "vision/row_time.hpp"
 
 namespace geoflow::slam {
 
@@ -39,11 +40,19 @@ struct Frame {
   FrameRef depth;                               ///< empty: none
   std::shared_ptr<const DepthCloud> cloud;      ///< of `depth`; null: none
   std::vector<Feature> features;
+  RowMotion rows{};
   std::shared_ptr<const PlaceView> place;  ///< null until it is asked for
   SE3 T_odom_cam;
   /// Whether the pose hangs together with the map; otherwise it only follows from earlier frames.
   bool anchored = true;
 
+  /// The feature that is seen at a raw pixel, where the middle of the image would have shown it:
+  /// depth, of a global shutter, is of that time. `expected_depth_m`: taken where none is measured;
+  /// 0: unknown.
+  [[nodiscard]] Feature feature_at(const Vector2d& raw, const CameraModel& camera,
+                                   double expected_depth_m = 0) const;
+
+ private:
   /// Measured depth [m] at a raw pixel; 0: none.
   [[nodiscard]] double depth_at(const Vector2d& raw) const {
     return cloud ? slam::depth_at(*cloud, depth, raw) : 0;

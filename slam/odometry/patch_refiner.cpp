@@ -14,6 +14,7 @@
 #include "vision/camera_model.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/patch_alignment.hpp"
+#include "vision/row_time.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -29,13 +30,17 @@ constexpr double kLargestAnisotropy = 3;
 std::optional<PatchWarp> PatchRefiner::warp(const Keyframe& reference, const Vector3d& p_odom,
                                             const Vector2d& ideal, const SE3& T_odom_cam,
                                             const Vector2d& raw) const {
-  const Vector2d in_reference = camera_.distort(ideal);
+  const Vector2d at_middle = camera_.distort(ideal);
   const SE3& T_odom_reference = reference.T_odom_cam;
   const Vector3d p_reference = T_odom_reference.inverse() * p_odom;
-  const Surfel* surfel = surface_at(*reference.cloud, in_reference, p_reference);
+  const Surfel* surfel = surface_at(*reference.cloud, at_middle, p_reference);
   if (surfel == nullptr) {
     return std::nullopt;
   }
+  const RowMotion& rows = reference.rows;
+  const Vector2d in_reference =
+      camera_.distort(ideal - rows.readout_s * row_shift(camera_, rows.twist, ideal, at_middle.y(),
+                                                         p_reference.z()));
   const SE3 T_reference_cam = T_odom_reference.inverse() * T_odom_cam;
   const Vector3d normal = surfel->normal.cast<double>();
   const Vector3d& origin = T_reference_cam.translation();

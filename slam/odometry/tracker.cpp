@@ -1,6 +1,7 @@
 #include "odometry/tracker.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -13,7 +14,9 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
+#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/slam/config.hpp"
 #include "geoflow/slam/stage.hpp"
 
@@ -35,6 +38,7 @@
 #include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 #include "vision/pnp.hpp"
+#include "vision/row_time.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -70,6 +74,7 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
   current_ = Frame{};
   current_.t = packet.t;
   current_.depth = packet.depth;
+  w_cam_ = turn_rate(packet);
   cloud_building_.run([this] { build_cloud(); });
   const StageScope scope{observer_, Stage::kPyramid};
   current_.pyramid = std::make_shared<const ImagePyramid>(
@@ -97,20 +102,19 @@ void Tracker::build_cloud() {
   }
 }
 
-Feature Tracker::feature_at(const Vector2d& raw) const {
-  return {.raw = raw, .ideal = camera_.undistort(raw), .depth_m = current_.depth_at(raw)};
-}
-
 void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
   const SE3 T_cam_odom = T_odom_cam_predicted.inverse();
   std::vector<FlowSeed> seeds;
+  std::vector<double> depth_m;
   for (const Feature& feature : previous_.features) {
     FlowSeed seed{.previous = feature.raw, .predicted = std::nullopt};
+    depth_m.push_back(0);
     const MapPoint* point = feature.point ? map.find_point(*feature.point) : nullptr;
     if (point != nullptr) {
       const Vector3d p_cam = T_cam_odom * point->p_odom;
       if (p_cam.z() > 0) {
         seed.predicted = camera_.distort(camera_.project(p_cam));
+        depth_m.back() = p_cam.z();
       }
     }
     seeds.push_back(seed);
@@ -126,7 +130,7 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
   finish_frame();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (const std::optional<Vector2d>& track = tracks[i]) {
-      Feature feature = feature_at(*track);
+      Feature feature = current_.feature_at(*track, camera_, depth_m[i]);
       feature.point = previous_.features[i].point;
       feature.anchor = previous_.features[i].anchor;
       feature.descriptor = previous_.features[i].descriptor;
@@ -160,7 +164,8 @@ void Tracker::follow_by_descriptors(const Map& map, const SE3& T_odom_cam_predic
   const std::vector<int> match = match_by_projection(expected, found, kRadiusPx);
   for (std::size_t i = 0; i < match.size(); ++i) {
     if (match[i] >= 0) {
-      Feature feature = feature_at(found[static_cast<std::size_t>(match[i])].pixel);
+      Feature feature =
+          current_.feature_at(found[static_cast<std::size_t>(match[i])].pixel, camera_);
       feature.point = points[i];
       current_.features.push_back(feature);
     }
@@ -182,7 +187,7 @@ std::optional<SE3> Tracker::relocate(const Map& map, const SE3& T_odom_cam_predi
   }
   current_.features.clear();
   for (const Relocation::Track& track : found->tracks) {
-    Feature feature = feature_at(track.raw);
+    Feature feature = current_.feature_at(track.raw, camera_);
     feature.point = track.point;
     feature.descriptor = map.find_point(track.point)->descriptor;
     current_.features.push_back(feature);
@@ -316,10 +321,65 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   return targets;
 }
 
+std::optional<Vector3d> Tracker::turn_rate(const SyncedPacket& packet) const {
+  constexpr Duration kAround = std::chrono::milliseconds{10};
+  if (!config_.switches.imu || !calibration_.T_cam_imu) {
+    return std::nullopt;
+  }
+  Vector3d sum = Vector3d::Zero();
+  int count = 0;
+  for (const Timed<ImuSample>& sample : packet.imu) {
+    if (sample.t >= packet.t - kAround && sample.sample.gyro_radps.allFinite()) {
+      sum += sample.sample.gyro_radps;
+      ++count;
+    }
+  }
+  if (count == 0) {
+    return std::nullopt;
+  }
+  return calibration_.T_cam_imu->rotation() * (sum / count);
+}
+
+void Tracker::expect_motion(const SE3& T_odom_cam_predicted) {
+  constexpr double kLongest_s = 0.2;
+  const double dt = to_seconds(current_.t - previous_.t);
+  if (!config_.switches.rolling_shutter || !w_cam_ || !(dt > 0 && dt < kLongest_s)) {
+    return;
+  }
+  current_.rows.readout_s = readout_.seconds();
+  current_.rows.twist = (previous_.T_odom_cam.inverse() * T_odom_cam_predicted).log() / dt;
+  current_.rows.twist.head<3>() = *w_cam_;
+}
+
+void Tracker::learn_readout(std::span<const VisualMatch> matches,
+                            const std::vector<std::size_t>& feature_of_match,
+                            const PoseSolution& solution) {
+  std::vector<ReadoutEstimate::Feature> features;
+  const SE3 T_cam_odom = solution.T_odom_cam.inverse();
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    const VisualMatch& match = matches[k];
+    const Vector3d p_cam = T_cam_odom * match.p_odom;
+    if (!solution.inlier[k] || p_cam.z() <= 0) {
+      continue;
+    }
+    Eigen::Matrix<double, 3, 6> point_by_pose;
+    point_by_pose << skew(p_cam), -Matrix3d::Identity();
+    const double row = current_.features[feature_of_match[k]].raw.y();
+    features.push_back(
+        {.shift = row_shift(camera_, current_.rows.twist, match.pixel, row, p_cam.z()),
+         .residual = camera_.project(p_cam) - match.pixel,
+         .by_pose = camera_.project_jacobian(p_cam) * point_by_pose});
+  }
+  readout_.add(features, solution.pixel_sigma);
+}
+
 TrackingResult Tracker::track(Map& map, const Prediction& predicted) {
   const PosePrior& prior = predicted.prior;
   TrackingResult result;
   const bool blind = is_blind(prior);
+  if (!blind) {
+    expect_motion(prior.T_odom_cam);
+  }
   // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image. But they
   // drift, so that a camera which sees again has to be looked for in the map.
   const bool reckoned = predicted.by == PoseSource::kLegs && fixed_;
@@ -343,6 +403,9 @@ TrackingResult Tracker::track(Map& map, const Prediction& predicted) {
       initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
   result.covariance = initial.sure ? result.solution.covariance : inverse(prior.information);
+  if (current_.rows.twist != Vector6d::Zero() && initial.sure) {
+    learn_readout(visual, feature_of_match, result.solution);
+  }
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);
   result.visual_fix = result.solution.visual_inliers >= enough;

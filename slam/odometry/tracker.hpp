@@ -67,6 +67,8 @@ class Tracker {
   /// the frame.
   [[nodiscard]] TrackingResult track(Map& map, const Prediction& predicted);
 
+  [[nodiscard]] const ReadoutEstimate& readout() const noexcept { return readout_; }
+
   /// Waits until the frame is read.
   [[nodiscard]] Frame& current() {
     finish_frame();
@@ -101,7 +103,13 @@ class Tracker {
   [[nodiscard]] InitialPose first_guess(const Map& map, const InitialPose& predicted, bool blind);
   void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
                     const PoseSolution& solution);
-  [[nodiscard]] Feature feature_at(const Vector2d& raw) const;
+  /// The camera's angular velocity about a packet's time [rad/s], in the camera, by the gyroscope.
+  [[nodiscard]] std::optional<Vector3d> turn_rate(const SyncedPacket& packet) const;
+  /// How the camera moves while the current frame is read out.
+  void expect_motion(const SE3& T_odom_cam_predicted);
+  void learn_readout(std::span<const VisualMatch> matches,
+                     const std::vector<std::size_t>& feature_of_match,
+                     const PoseSolution& solution);
 
   Config config_;
   GicpConfig gicp_;
@@ -118,7 +126,9 @@ class Tracker {
   Frame previous_;
   Frame current_;
   tbb::task_group cloud_building_;  ///< of the current frame
-  bool fixed_ = true;               ///< the last frame, by points or depth
+  std::optional<Vector3d> w_cam_;   ///< of the current frame, by the gyroscope
+  ReadoutEstimate readout_;
+  bool fixed_ = true;  ///< the last frame, by points or depth
 };
 
 }  // namespace geoflow::slam

@@ -14,6 +14,7 @@
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/slam/core.hpp"
 
 #include "replay/session.hpp"
 
@@ -94,6 +95,8 @@ json make_report(const ReplayResult& result, const daemon::Config& config) {
   report["faults"] = describe_faults(streams.faults());
   report["rejected"] = {{"count", result.run.statistics->counters.rejected.load()},
                         {"messages", streams.recent_errors()}};
+  const slam::Core::Readout readout = result.run.core->readout();
+  report["camera_readout"] = {{"mean_s", readout.mean_s}, {"sigma_s", readout.sigma_s}};
   report["synchroniser"] = daemon::to_json(result.run.synchroniser);
   report["speed"] = describe_speed(result);
   report["peak_memory_mib"] = daemon::peak_memory_mib();

@@ -19,6 +19,9 @@ struct Switches {
   bool imu = true;  ///< the IMU predicts motion, where its place on the camera is known (IV-B)
   bool legs =
       true;  ///< so do legs or body velocities, where the camera's place on the robot is known
+  /// Features are put where the middle of the image would have shown them, and the colour camera's
+  /// readout is found out.
+  bool rolling_shutter = true;
   bool loop_closing = true;  ///< places known again correct the map
 };
 

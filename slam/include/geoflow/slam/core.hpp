@@ -65,6 +65,13 @@ class Core {
   /// their pose relative to its newest keyframe.
   void apply(const MappingResult& result);
 
+  /// How long the colour camera takes to read its rows out, as its features have shown [s].
+  struct Readout {
+    double mean_s = 0;
+    double sigma_s = 0;
+  };
+  [[nodiscard]] Readout readout() const;
+
   /// T_odom_base of every frame that was tracked, after all optimisation so far, in order of time.
   [[nodiscard]] Trajectory final_trajectory() const;
 
