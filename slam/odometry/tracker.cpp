@@ -1,7 +1,6 @@
 #include "odometry/tracker.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -14,9 +13,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
-#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/synced_packet.hpp"
-#include "geoflow/hal/time.hpp"
 #include "geoflow/slam/config.hpp"
 #include "geoflow/slam/stage.hpp"
 
@@ -58,6 +55,7 @@ Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration
       camera_{calibration.camera},
       flow_{config.flow, camera_},
       refiner_{camera_},
+      rows_{config.switches, calibration},
       optimiser_{config.pose, config.mapping, gicp, camera_},
       orb_{config.features},
       relocaliser_{config, gicp, camera_},
@@ -74,7 +72,7 @@ void Tracker::begin_frame(const SyncedPacket& packet) {
   current_ = Frame{};
   current_.t = packet.t;
   current_.depth = packet.depth;
-  w_cam_ = turn_rate(packet);
+  rows_.begin_frame(packet);
   cloud_building_.run([this] { build_cloud(); });
   const StageScope scope{observer_, Stage::kPyramid};
   current_.pyramid = std::make_shared<const ImagePyramid>(
@@ -321,64 +319,12 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   return targets;
 }
 
-std::optional<Vector3d> Tracker::turn_rate(const SyncedPacket& packet) const {
-  constexpr Duration kAround = std::chrono::milliseconds{10};
-  if (!config_.switches.imu || !calibration_.T_cam_imu) {
-    return std::nullopt;
-  }
-  Vector3d sum = Vector3d::Zero();
-  int count = 0;
-  for (const Timed<ImuSample>& sample : packet.imu) {
-    if (sample.t >= packet.t - kAround && sample.sample.gyro_radps.allFinite()) {
-      sum += sample.sample.gyro_radps;
-      ++count;
-    }
-  }
-  if (count == 0) {
-    return std::nullopt;
-  }
-  return calibration_.T_cam_imu->rotation() * (sum / count);
-}
-
-void Tracker::expect_motion(const SE3& T_odom_cam_predicted) {
-  constexpr double kLongest_s = 0.2;
-  const double dt = to_seconds(current_.t - previous_.t);
-  if (!config_.switches.rolling_shutter || !w_cam_ || !(dt > 0 && dt < kLongest_s)) {
-    return;
-  }
-  current_.rows.readout_s = readout_.seconds();
-  current_.rows.twist = (previous_.T_odom_cam.inverse() * T_odom_cam_predicted).log() / dt;
-  current_.rows.twist.head<3>() = *w_cam_;
-}
-
-void Tracker::learn_readout(std::span<const VisualMatch> matches,
-                            const std::vector<std::size_t>& feature_of_match,
-                            const PoseSolution& solution) {
-  std::vector<ReadoutEstimate::Feature> features;
-  const SE3 T_cam_odom = solution.T_odom_cam.inverse();
-  for (std::size_t k = 0; k < matches.size(); ++k) {
-    const VisualMatch& match = matches[k];
-    const Vector3d p_cam = T_cam_odom * match.p_odom;
-    if (!solution.inlier[k] || p_cam.z() <= 0) {
-      continue;
-    }
-    Eigen::Matrix<double, 3, 6> point_by_pose;
-    point_by_pose << skew(p_cam), -Matrix3d::Identity();
-    const double row = current_.features[feature_of_match[k]].raw.y();
-    features.push_back(
-        {.shift = row_shift(camera_, current_.rows.twist, match.pixel, row, p_cam.z()),
-         .residual = camera_.project(p_cam) - match.pixel,
-         .by_pose = camera_.project_jacobian(p_cam) * point_by_pose});
-  }
-  readout_.add(features, solution.pixel_sigma);
-}
-
 TrackingResult Tracker::track(Map& map, const Prediction& predicted) {
   const PosePrior& prior = predicted.prior;
   TrackingResult result;
   const bool blind = is_blind(prior);
   if (!blind) {
-    expect_motion(prior.T_odom_cam);
+    current_.rows = rows_.motion(previous_, current_.t, prior.T_odom_cam).value_or(RowMotion{});
   }
   // Legs and IMU come first (paper, IV-B): they know nothing of what moves in the image. But they
   // drift, so that a camera which sees again has to be looked for in the map.
@@ -403,8 +349,8 @@ TrackingResult Tracker::track(Map& map, const Prediction& predicted) {
       initial.T_odom_cam);
   current_.T_odom_cam = result.solution.T_odom_cam;
   result.covariance = initial.sure ? result.solution.covariance : inverse(prior.information);
-  if (current_.rows.twist != Vector6d::Zero() && initial.sure) {
-    learn_readout(visual, feature_of_match, result.solution);
+  if (initial.sure) {
+    rows_.learn(current_, visual, feature_of_match, result.solution);
   }
   keep_inliers(map, feature_of_match, result.solution);
   const auto enough = static_cast<std::uint32_t>(config_.pose.minimum_visual_inliers);

@@ -19,6 +19,7 @@
 #include "odometry/motion_model.hpp"
 #include "odometry/patch_refiner.hpp"
 #include "odometry/pose_optimiser.hpp"
+#include "odometry/row_timing.hpp"
 #include "place/relocaliser.hpp"
 #include "vision/dual_stream_flow.hpp"
 #include "vision/orb_features.hpp"
@@ -67,7 +68,7 @@ class Tracker {
   /// the frame.
   [[nodiscard]] TrackingResult track(Map& map, const Prediction& predicted);
 
-  [[nodiscard]] const ReadoutEstimate& readout() const noexcept { return readout_; }
+  [[nodiscard]] const ReadoutEstimate& readout() const noexcept { return rows_.readout(); }
 
   /// Waits until the frame is read.
   [[nodiscard]] Frame& current() {
@@ -103,13 +104,6 @@ class Tracker {
   [[nodiscard]] InitialPose first_guess(const Map& map, const InitialPose& predicted, bool blind);
   void keep_inliers(Map& map, const std::vector<std::size_t>& feature_of_match,
                     const PoseSolution& solution);
-  /// The camera's angular velocity about a packet's time [rad/s], in the camera, by the gyroscope.
-  [[nodiscard]] std::optional<Vector3d> turn_rate(const SyncedPacket& packet) const;
-  /// How the camera moves while the current frame is read out.
-  void expect_motion(const SE3& T_odom_cam_predicted);
-  void learn_readout(std::span<const VisualMatch> matches,
-                     const std::vector<std::size_t>& feature_of_match,
-                     const PoseSolution& solution);
 
   Config config_;
   GicpConfig gicp_;
@@ -117,6 +111,7 @@ class Tracker {
   CameraModel camera_;
   DualStreamFlow flow_;
   PatchRefiner refiner_;
+  RowTiming rows_;
   PoseOptimiser optimiser_;
   OrbExtractor orb_;
   Relocaliser relocaliser_;
@@ -126,9 +121,7 @@ class Tracker {
   Frame previous_;
   Frame current_;
   tbb::task_group cloud_building_;  ///< of the current frame
-  std::optional<Vector3d> w_cam_;   ///< of the current frame, by the gyroscope
-  ReadoutEstimate readout_;
-  bool fixed_ = true;  ///< the last frame, by points or depth
+  bool fixed_ = true;               ///< the last frame, by points or depth
 };
 
 }  // namespace geoflow::slam
