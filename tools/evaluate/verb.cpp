@@ -194,15 +194,16 @@ Result<Evaluation> EvaluateVerb::measure(Console& console, const EvaluationOptio
     object["reference"] = {{"path", reference_},
                            {"format", to_string(reference->format)},
                            {"poses", reference->poses.size()}};
-    if (*consistency) {
-      object["consistency"] = to_json(**consistency);
+    const std::optional<Consistency>& honest = *consistency;
+    if (honest) {
+      object["consistency"] = to_json(*honest);
     }
     console.object(object);
     console.line("estimate   {} ({} poses)", estimate_, estimate->poses.size());
     console.line("reference  {} ({} poses)", reference_, reference->poses.size());
     print_report(console, *evaluation, options);
-    if (*consistency) {
-      print_consistency(console, **consistency);
+    if (honest) {
+      print_consistency(console, *honest);
     }
   }
   return evaluation;

@@ -9,6 +9,7 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/lock_step_runner.hpp"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/drivers/faults.hpp"

@@ -134,7 +134,7 @@ TEST_F(ReadoutEstimateTest, StandingTeachesNothing) {
 
 TEST_F(ReadoutEstimateTest, AFewFeaturesOrBrokenOnesTeachNothing) {
   estimate_.add(std::vector<ReadoutEstimate::Feature>(5, {.shift = {9, 9}, .residual = {1, 1}}), 1);
-  ReadoutEstimate::Feature broken{.shift = {9, 9}, .residual = {1, std::nan("")}};
+  const ReadoutEstimate::Feature broken{.shift = {9, 9}, .residual = {1, std::nan("")}};
   estimate_.add(std::vector<ReadoutEstimate::Feature>(50, broken), 1);
   EXPECT_EQ(estimate_.seconds(), 0);
 }

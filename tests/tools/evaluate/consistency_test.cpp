@@ -34,7 +34,7 @@ Walk walk(double honesty) {
   const SE3 T_odom_ref = SE3::exp((Vector6d{} << 0.3, -0.2, 1, 4, 5, -6).finished());
   Walk made;
   for (std::size_t i = 0; i < kPoses; ++i) {
-    const double s = static_cast<double>(i);
+    const auto s = static_cast<double>(i);
     const SE3 pose = SE3::exp((Vector6d{} << 0, 0.1, 0.01 * s, 0.02 * s, 0, 0).finished());
     Vector6d drawn = Vector6d::Zero();
     if (i > 0) {

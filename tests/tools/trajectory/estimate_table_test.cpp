@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,7 @@ class EstimateTableTest : public testing::Test {
     for (std::size_t i = 0; i < estimates.size(); ++i) {
       PoseEstimate& estimate = estimates[i];
       estimate.t = HostTime{std::chrono::nanoseconds{1'305'031'102'160'407'001 + i}};
-      const double s = static_cast<double>(i);
+      const auto s = static_cast<double>(i);
       estimate.T_odom_base = SE3::exp((Vector6d{} << 0.1 * s, 2, -3, 4, 5.5 * s, 6).finished());
       Matrix6d root = Matrix6d::Random();
       estimate.covariance = root * root.transpose();
