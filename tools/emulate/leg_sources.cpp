@@ -7,7 +7,6 @@
 #include <ctime>
 #include <filesystem>
 #include <optional>
-#include <stop_token>
 #include <utility>
 
 #include <sys/timerfd.h>
@@ -31,8 +30,6 @@
 
 namespace geoflow::tools {
 namespace {
-
-using drivers::EmittedSample;
 
 constexpr double kWayM = 5;  // of the simulated walk, one way
 
@@ -62,19 +59,30 @@ class Alarm {
   UniqueFd fd_;
 };
 
-/// Puts a recording's samples together and hands them on.
+/// Puts a recording's samples together and hands them on when it is their time.
 class RecordedSink final : public LegSink, public ImuSink {
  public:
-  RecordedSink(std::optional<Matrix3d> R_base_imu, Duration offset, const SampleHandler& handler)
-      : R_base_imu_{std::move(R_base_imu)}, offset_{offset}, handler_{handler} {}
+  RecordedSink(std::optional<Matrix3d> R_base_imu, std::optional<Duration> shift, Duration offset,
+               const Alarm& alarm, const SampleHandler& handler)
+      : R_base_imu_{std::move(R_base_imu)},
+        shift_{shift},
+        offset_{offset},
+        alarm_{alarm},
+        handler_{handler} {}
 
   void on_legs(const Arrival<LegClock, LegSample>& sample) override {
+    shift_ = shift_.value_or(begin_ - sample.t_arrival);
+    const HostTime due = sample.t_arrival + *shift_;
+    if (due < begin_) {
+      return;
+    }
     first_ = first_.value_or(sample.t_device);
     const Duration since = sample.t_device - *first_;
-    if (since >= Duration::zero() && !stop_.stop_requested() &&
-        !handler_({.legs = sample.sample, .body_imu = imu_, .device_time = offset_ + since})) {
-      stop_.request_stop();
+    if (since < Duration::zero()) {
+      return;
     }
+    alarm_.wait_until(due);
+    wanted_ = handler_({.legs = sample.sample, .body_imu = imu_, .device_time = offset_ + since});
   }
   void on_body_velocity(const Arrival<LegClock, BodyVelocitySample>& /*sample*/) override {}
   void on_imu(const Arrival<ImuClock, ImuSample>& sample) override {
@@ -83,24 +91,30 @@ class RecordedSink final : public LegSink, public ImuSink {
               .gyro_radps = *R_base_imu_ * sample.sample.gyro_radps};
     }
   }
-  [[nodiscard]] std::stop_token stop() const { return stop_.get_token(); }
+  /// False once the handler has said that it is enough.
+  [[nodiscard]] bool wanted() const noexcept { return wanted_; }
 
  private:
   std::optional<Matrix3d> R_base_imu_;
+  std::optional<Duration> shift_;
   Duration offset_;
+  const Alarm& alarm_;
   const SampleHandler& handler_;
   std::optional<DeviceTime<LegClock>> first_;
   ImuSample imu_;
-  std::stop_source stop_;
+  HostTime begin_ = HostClock::now();
+  bool wanted_ = true;
 };
 
 }  // namespace
 
-Result<void> play_recorded_legs(const std::filesystem::path& recording, Duration offset,
+Result<void> play_recorded_legs(const std::filesystem::path& recording,
+                                std::optional<Duration> shift, Duration offset,
                                 const SampleHandler& handler) {
   auto streams = drivers::RecordedStreams::open({.path = recording, .color_as_gray = true});
-  if (!streams) {
-    return tl::unexpected{std::move(streams.error())};
+  const auto alarm = Alarm::create();
+  if (!streams || !alarm) {
+    return tl::unexpected{streams ? alarm.error() : streams.error()};
   }
   Legs* const legs = (*streams)->legs();
   if (legs == nullptr || !(*streams)->info().has(drivers::StreamId::kLegs)) {
@@ -111,12 +125,16 @@ Result<void> play_recorded_legs(const std::filesystem::path& recording, Duration
   if (calibration.T_base_cam && calibration.T_cam_imu) {
     R_base_imu = (*calibration.T_base_cam * *calibration.T_cam_imu).rotation_matrix();
   }
-  RecordedSink sink{std::move(R_base_imu), offset, handler};
+  RecordedSink sink{std::move(R_base_imu), shift, offset, *alarm, handler};
   auto started = legs->start(sink);
   if (started && (*streams)->imu() != nullptr) {
     started = (*streams)->imu()->start(sink);
   }
-  return started.and_then([&] { return (*streams)->play(sink.stop()); });
+  bool more = true;
+  while (started && more && sink.wanted()) {
+    more = (*streams)->step().value_or(true);  // an error concerns one sample, which is left out
+  }
+  return started;
 }
 
 Result<void> play_simulated_legs(const SimulatedLegs& options, Duration offset,

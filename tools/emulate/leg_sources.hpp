@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 
 #include "geoflow/drivers/leg_emitter.hpp"
 #include "geoflow/hal/result.hpp"
@@ -14,12 +15,15 @@ namespace geoflow::tools {
 /// Gets each sample when it is its time; false ends the run.
 using SampleHandler = std::function<bool(const drivers::EmittedSample&)>;
 
-/// The legs of a recording at its own pace. The body's IMU says what the recording's says, turned
+/// The legs of a recording at its own pace. `shift` is what is added to the recording's time to get
+/// the host's; samples whose time is over when it begins are left out. None: it begins now. The
+/// body's IMU says what the recording's says, turned
 /// to the robot's axes where the calibration tells how the camera is mounted, else zero; that it is
 /// at another place is not taken into account. `offset` is added to device times, which begin at 0.
 /// An error if it cannot be opened or has no legs.
 [[nodiscard]] Result<void> play_recorded_legs(const std::filesystem::path& recording,
-                                              Duration offset, const SampleHandler& handler);
+                                              std::optional<Duration> shift, Duration offset,
+                                              const SampleHandler& handler);
 
 /// The legs of a simulated Go2 that walks to and fro on a straight line, with the sensors' usual
 /// errors, and an ideal body IMU. Deterministic but for its pace.

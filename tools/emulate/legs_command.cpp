@@ -57,6 +57,12 @@ void LegsCommand::declare(CLI::App& command) {
       ->capture_default_str();
   CLI::Option* const recording =
       command.add_option("--recording", recording_, "Recording whose legs are sent");
+  command
+      .add_option(
+          "--shift", shift_ns_,
+          "CLOCK_MONOTONIC less the recording's time [ns], as `emulate d435i` says it: what "
+          "is over by then is left out (default: the recording begins now)")
+      ->needs(recording);
   command.add_flag("--simulate", simulate_, "Send a simulated walk (the default)")
       ->excludes(recording);
   command.add_option("--seed", simulated_.seed, "Decides the simulated walk")
@@ -77,6 +83,10 @@ Result<std::unique_ptr<drivers::LegEmitter>> LegsCommand::open() const {
     return drivers::open_dds_emitter({.interface = dds_, .domain = domain_});
   }
   return fail(ErrorCode::kInvalidArgument, "--can INTERFACE or --dds INTERFACE is needed");
+}
+
+std::optional<Duration> LegsCommand::shift() const {
+  return shift_ns_ ? std::optional{Duration{*shift_ns_}} : std::nullopt;
 }
 
 Result<ExitCode> LegsCommand::run(Console& console) const {
@@ -103,7 +113,7 @@ Result<ExitCode> LegsCommand::run(Console& console) const {
   Duration offset = kFirstDeviceTime;
   do {
     played = recording_.empty() ? play_simulated_legs(simulated_, offset, handler)
-                                : play_recorded_legs(recording_, offset, handler);
+                                : play_recorded_legs(recording_, shift(), offset, handler);
     offset = last + std::chrono::milliseconds{2};
   } while (played && loop_ && !failure && !InterruptScope::requested());
   if (!played || failure) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include "geoflow/drivers/leg_emitter.hpp"
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
 
 #include "emulate/leg_sources.hpp"
@@ -27,6 +29,7 @@ class LegsCommand {
 
  private:
   [[nodiscard]] Result<std::unique_ptr<drivers::LegEmitter>> open() const;
+  [[nodiscard]] std::optional<Duration> shift() const;
 
   std::string can_;
   std::filesystem::path dictionary_;
@@ -34,6 +37,7 @@ class LegsCommand {
   std::string dds_;
   int domain_ = 0;
   std::filesystem::path recording_;
+  std::optional<std::int64_t> shift_ns_;
   bool simulate_ = false;
   bool loop_ = false;
   SimulatedLegs simulated_;

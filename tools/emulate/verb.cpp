@@ -82,6 +82,7 @@ class EmulateVerb final : public Verb {
   [[nodiscard]] Result<std::vector<emulator::TimedFault>> faults() const;
   [[nodiscard]] Result<ExitCode> serve(emulator::UsbDevice& device, const emulator::D435i& camera,
                                        Console& console) const;
+  static void report_shift(Duration shift, Console& console);
   static void report(const emulator::D435iCounters& counters, Console& console);
 
   CLI::App* legs_command_ = nullptr;
@@ -202,11 +203,21 @@ Result<ExitCode> EmulateVerb::serve(emulator::UsbDevice& device, const emulator:
   }
   const InterruptScope interrupt;
   Result<void> served;
+  std::optional<Duration> shift;
   while (served && !InterruptScope::requested()) {
     served = (*server)->serve(kLongestWait);
+    if (camera.recording_shift() != shift) {
+      shift = camera.recording_shift();
+      report_shift(*shift, console);
+    }
   }
   report(camera.counters(), console);
   return served.map([] { return ExitCode::kInterrupted; });
+}
+
+void EmulateVerb::report_shift(Duration shift, Console& console) {
+  console.object({{"shift_ns", shift.count()}});
+  console.line("It plays; the same robot's legs: --shift {}", shift.count());
 }
 
 void EmulateVerb::report(const emulator::D435iCounters& counters, Console& console) {

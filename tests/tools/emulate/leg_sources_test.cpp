@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 
@@ -59,11 +60,11 @@ TEST(SimulatedLegs, EndWhenTheHandlerSaysSo) {
   EXPECT_EQ(count, 5);
 }
 
-TEST(RecordedLegs, ComeAtTheRecordingsPace) {
-  const tests::TemporaryDirectory directory;
-  const auto log = directory.path() / "walk.log";
+constexpr int kRounds = 50;
+
+/// A CAN log of kRounds rounds, of which the first begins at 100 s.
+void write_walk(const std::filesystem::path& log) {
   std::ofstream file{log};
-  constexpr int kRounds = 50;
   for (int round = 0; round < kRounds; ++round) {
     const int stamp_us = 2000 * round;
     // SYNC of round, then angles, rates and torques of the four legs, all the same.
@@ -76,11 +77,16 @@ TEST(RecordedLegs, ComeAtTheRecordingsPace) {
       }
     }
   }
-  file.close();
+}
+
+TEST(RecordedLegs, ComeAtTheRecordingsPace) {
+  const tests::TemporaryDirectory directory;
+  const auto log = directory.path() / "walk.log";
+  write_walk(log);
   int count = 0;
   std::optional<drivers::EmittedSample> last;
   const auto played =
-      play_recorded_legs(log, milliseconds{500}, [&](const drivers::EmittedSample& sample) {
+      play_recorded_legs(log, {}, milliseconds{500}, [&](const drivers::EmittedSample& sample) {
         ++count;
         last = sample;
         return true;
@@ -92,7 +98,36 @@ TEST(RecordedLegs, ComeAtTheRecordingsPace) {
   EXPECT_DOUBLE_EQ(last->legs.joints[1].q_rad, 0.04);
   EXPECT_DOUBLE_EQ(last->legs.joints[2].dq_radps, 0.6);
   EXPECT_TRUE(last->body_imu.gyro_radps.isZero());
-  EXPECT_FALSE(play_recorded_legs(directory.path() / "none.log", {}, {}));
+  EXPECT_FALSE(play_recorded_legs(directory.path() / "none.log", {}, {}, {}));
+}
+
+TEST(RecordedLegs, ComeWhenTheirShiftSays) {
+  const tests::TemporaryDirectory directory;
+  const auto log = directory.path() / "walk.log";
+  write_walk(log);
+  const HostTime first{std::chrono::seconds{100}};
+  const HostTime begin = HostClock::now() + std::chrono::seconds{2};  // opening takes less
+  int count = 0;
+  ASSERT_TRUE(play_recorded_legs(log, begin - first, {}, [&](const drivers::EmittedSample& sample) {
+    EXPECT_GE(HostClock::now(), begin + count * milliseconds{2});
+    EXPECT_EQ(sample.device_time, count * milliseconds{2});
+    ++count;
+    return true;
+  }));
+  EXPECT_EQ(count, kRounds);
+}
+
+TEST(RecordedLegs, AreLeftOutWhereTheirTimeIsOver) {
+  const tests::TemporaryDirectory directory;
+  const auto log = directory.path() / "walk.log";
+  write_walk(log);
+  const Duration long_ago = HostClock::now() - HostTime{std::chrono::seconds{200}};
+  int count = 0;
+  ASSERT_TRUE(play_recorded_legs(log, long_ago, {}, [&](const drivers::EmittedSample&) {
+    ++count;
+    return true;
+  }));
+  EXPECT_EQ(count, 0);
 }
 
 class CountingSink final : public LegSink, public ImuSink {

@@ -60,6 +60,9 @@ TEST(RecordedWorld, GoesRoundWithoutItsTimeEverGoingBack) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     ASSERT_GE(samples[i].t_sent, samples[i - 1].t_sent) << "sample " << i;
   }
+  EXPECT_EQ(samples[800].t_sent_recorded, samples[0].t_sent_recorded);
+  EXPECT_EQ(samples[799].t_sent_recorded - samples[0].t_sent_recorded,
+            samples[799].t_sent - samples[0].t_sent);
   // The first frame of the second round comes one frame after the last of the first.
   EXPECT_NEAR(to_seconds(samples[800].t_sent), 400.0 / 30.0, 2e-3);
 }

@@ -86,6 +86,9 @@ class Camera final : public D435i {
   [[nodiscard]] bool connected(HostTime now) override;
   void reset(HostTime now) override;
   [[nodiscard]] D435iCounters counters() const override;
+  [[nodiscard]] std::optional<Duration> recording_shift() const override {
+    return player_.recording_shift();
+  }
 
  private:
   [[nodiscard]] std::optional<Bytes> answer(const SetupPacket& setup,

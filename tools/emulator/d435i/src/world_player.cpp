@@ -22,10 +22,9 @@ void WorldPlayer::look_ahead() {
     auto sample = world_->next();
     if (!sample) {
       ++errors_;
-    } else if (*sample) {
-      ahead_ = std::move(**sample);
     } else {
-      ended_ = true;
+      ahead_ = std::move(*sample);
+      ended_ = !ahead_;
     }
   }
 }
@@ -34,10 +33,12 @@ std::optional<WorldSample> WorldPlayer::next(HostTime now) {
   if (next_due() > now) {
     return std::nullopt;
   }
-  if (ahead_->resumes) {
-    start_ = now - ahead_->t_sent;
+  auto sample = std::exchange(ahead_, std::nullopt);
+  if (sample) {
+    start_ = sample->resumes ? now - sample->t_sent : start_;
+    shift_ = host_time(sample->t_sent).time_since_epoch() - sample->t_sent_recorded;
   }
-  return std::exchange(ahead_, std::nullopt);
+  return sample;
 }
 
 HostTime WorldPlayer::next_due() {

@@ -25,6 +25,8 @@ class WorldPlayer {
   [[nodiscard]] HostTime next_due();
   /// When the host's clock showed, or will, a time of the world's; only while it runs.
   [[nodiscard]] HostTime host_time(Duration t) const noexcept { return start_ + t; }
+  /// The host's time less the recording's, by the newest sample; none before the first.
+  [[nodiscard]] std::optional<Duration> recording_shift() const noexcept { return shift_; }
   [[nodiscard]] std::uint64_t errors() const noexcept { return errors_; }
 
  private:
@@ -36,6 +38,7 @@ class WorldPlayer {
   bool running_ = false;
   HostTime start_{};      ///< of the world, while it runs
   Duration paused_at_{};  ///< on the world's time line
+  std::optional<Duration> shift_{};
   std::uint64_t errors_ = 0;
 };
 

@@ -50,6 +50,7 @@ class Collector final : public CameraSink, public ImuSink {
     const Duration t_sent = arrival.t_arrival.time_since_epoch();
     samples_.push_back({.t = device_stamps_ ? arrival.t_device.time_since_epoch() : t_sent,
                         .t_sent = t_sent,
+                        .t_sent_recorded = t_sent,
                         .sample = arrival.sample});
   }
 

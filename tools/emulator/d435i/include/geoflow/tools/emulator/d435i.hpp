@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/time.hpp"
 #include "geoflow/tools/emulator/usb_device.hpp"
 #include "geoflow/tools/emulator/world.hpp"
 
@@ -55,6 +57,9 @@ class D435i : public UsbDevice {
                                                              std::unique_ptr<World> world);
 
   [[nodiscard]] virtual D435iCounters counters() const = 0;
+  /// What is added to the recording's time to get the host's, by the newest sample; it changes
+  /// where the world has stood still or begins again. None before the first sample.
+  [[nodiscard]] virtual std::optional<Duration> recording_shift() const = 0;
 };
 
 }  // namespace geoflow::emulator

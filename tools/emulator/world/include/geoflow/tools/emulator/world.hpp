@@ -15,6 +15,7 @@ struct WorldSample {
   Duration t{};  ///< when: the middle of an exposure, an IMU's instant; since the world's start
   Duration
       t_sent{};  ///< when the camera has it ready to send; never decreases from sample to sample
+  Duration t_sent_recorded{};  ///< t_sent on the time line of the recording that it is from
   std::variant<ColorFrame, DepthFrame, ImuSample> sample{};
   /// The world took its time before this one (to begin again): it is not late, but all that follows
   /// is later.
