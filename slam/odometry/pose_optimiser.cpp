@@ -172,6 +172,7 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) co
     system.gradient += problem.prior.information * from_prior;
     const Eigen::LDLT<Matrix6d> H{system.H + problem.prior.information};
     solution.covariance = H.solve(Matrix6d::Identity());
+    solution.sight = system.H;
     solution.depth_inliers = system.depth_inliers;
     const Vector6d step = -H.solve(system.gradient);
     if (!step.allFinite()) {

@@ -50,6 +50,8 @@ struct PoseProblem {
 struct PoseSolution {
   SE3 T_odom_cam;
   Matrix6d covariance = Matrix6d::Zero();  ///< of a right perturbation
+  /// Of what is seen alone, without the prior: a direction that nothing seen tells has none.
+  Matrix6d sight = Matrix6d::Zero();
   std::vector<bool> inlier;                ///< of each visual match
   std::uint32_t visual_inliers = 0;
   std::uint32_t depth_inliers =
