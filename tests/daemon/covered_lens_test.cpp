@@ -41,7 +41,7 @@ double way_m(const Trajectory& trajectory, double from_s, double until_s) {
 
 TEST(CoveredLens, TenBlindSecondsOfWalkingAreBridgedByImuAndLegsAndSaid) {
   const tests::TemporaryDirectory directory;
-  const auto bag = simulate_walk(directory.path(), 3, 16);
+  const auto bag = simulate_walk(directory.path(), "office", 3, 16);
   ASSERT_FALSE(bag.empty());
   const auto out = directory.path() / "out";
   const auto script = directory.path() / "faults.toml";

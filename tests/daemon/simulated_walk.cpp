@@ -15,11 +15,11 @@
 
 namespace geoflow::tests {
 
-std::filesystem::path simulate_walk(const std::filesystem::path& directory, int seed,
-                                    int duration_s) {
+std::filesystem::path simulate_walk(const std::filesystem::path& directory,
+                                    const std::string& scene, int seed, int duration_s) {
   const auto bag = directory / "bag";
   const Finished simulated =
-      run_process({GEOFLOW_PROGRAM, "simulate", "office", "-o", bag.string(), "--seed",
+      run_process({GEOFLOW_PROGRAM, "simulate", scene, "-o", bag.string(), "--seed",
                    std::to_string(seed), "--duration", std::to_string(duration_s), "--set",
                    "camera.width=320", "--set", "camera.height=240"},
                   directory / "simulate");

@@ -1,15 +1,16 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "geoflow/hal/trajectory.hpp"
 
 namespace geoflow::tests {
 
-/// Simulates a walk through the office, in images of half the camera's size, as a bag in
+/// Simulates a walk through a scene, in images of half the camera's size, as a bag in
 /// `directory`/bag. A test failure, and an empty path, where that does not work.
-std::filesystem::path simulate_walk(const std::filesystem::path& directory, int seed,
-                                    int duration_s);
+std::filesystem::path simulate_walk(const std::filesystem::path& directory,
+                                    const std::string& scene, int seed, int duration_s);
 
 /// A trajectory in TUM's format; a test failure where it cannot be read.
 Trajectory read_poses(const std::filesystem::path& file);

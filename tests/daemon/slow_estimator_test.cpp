@@ -66,7 +66,7 @@ class SlowEstimator {
 TEST(SlowEstimator, ImuAndLegsCarryThePoseAcrossImagesThatThereIsNoTimeFor) {
   const tests::TemporaryDirectory directory;
   Config config;
-  config.source.replay = tests::simulate_walk(directory.path(), 3, 10);
+  config.source.replay = tests::simulate_walk(directory.path(), "office", 3, 10);
   ASSERT_FALSE(config.source.replay.empty());
   const Trajectory truth = tests::read_poses(config.source.replay / "groundtruth_base.txt");
   // Ten, four and two images a second of thirty.
