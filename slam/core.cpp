@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
@@ -50,14 +49,6 @@ constexpr int kLostFrames = 15;
 /// Depth of a saved map is read where the camera comes near it: with each keyframe some.
 constexpr double kNearM = 4;
 constexpr std::size_t kCloudsAtOnce = 8;
-
-/// Whether what is seen tells a pose in all directions [rad, m]. Before a plain wall it does not,
-/// nor in a corridor without doors: there legs and IMU carry the pose, as long as they do.
-bool sees_all_of(const Matrix6d& sight) {
-  constexpr double kToldTo = 0.1;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver{sight, Eigen::EigenvaluesOnly};
-  return solver.info() == Eigen::Success && solver.eigenvalues()[0] > 1 / (kToldTo * kToldTo);
-}
 
 }  // namespace
 
@@ -208,7 +199,7 @@ class Core::Impl {
     const Matrix6d A = T_base_cam_.adjoint();
     estimate.covariance = A * covariance * A.transpose();
     estimate.status =
-        fixed && sees_all_of(result.solution.sight) ? fixed_status() : TrackingStatus::kDegraded;
+        fixed && result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
     estimate.quality = quality(result);
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       keyframe_due_ = covariance;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "geoflow/hal/geometry.hpp"
 
@@ -33,6 +34,12 @@ Eigen::Matrix<double, 3, 6> camera_point_jacobian(const Vector3d& q) {
 }
 
 }  // namespace
+
+bool PoseSolution::seen_whole() const {
+  constexpr double kToldTo = 0.1;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver{sight, Eigen::EigenvaluesOnly};
+  return solver.info() == Eigen::Success && solver.eigenvalues()[0] > 1 / (kToldTo * kToldTo);
+}
 
 struct PoseOptimiser::System {
   Matrix6d H = Matrix6d::Zero();

@@ -52,12 +52,16 @@ struct PoseSolution {
   Matrix6d covariance = Matrix6d::Zero();  ///< of a right perturbation
   /// Of what is seen alone, without the prior: a direction that nothing seen tells has none.
   Matrix6d sight = Matrix6d::Zero();
-  std::vector<bool> inlier;                ///< of each visual match
+  std::vector<bool> inlier;  ///< of each visual match
   std::uint32_t visual_inliers = 0;
   std::uint32_t depth_inliers =
       0;  ///< of depth_surfels, the largest number that pairs with one target
   std::uint32_t depth_surfels = 0;  ///< of the frame that were tried
   double pixel_sigma = 0;  ///< standard deviation of the visual residuals, estimated from them [px]
+
+  /// Whether what is seen tells the pose in all directions [rad, m]. Before a plain wall it does
+  /// not, nor in a corridor without doors: there legs and IMU carry the pose, as long as they do.
+  [[nodiscard]] bool seen_whole() const;
 };
 
 /// Robust Gauss-Newton from `start`. Residuals:
