@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <fstream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,7 @@
 #include "geoflow/tools/simulator/support_forces.hpp"
 #include "geoflow/tools/simulator/walk.hpp"
 #include "geoflow/tools/simulator/walk_options.hpp"
+#include "tests/support/data.hpp"
 
 #include "walk_fixture.hpp"
 
@@ -24,6 +27,53 @@ namespace geoflow::simulator {
 namespace {
 
 using tests::walk_for;
+
+/// 0.061 s on slippery floor, 0.080 s on hard floor.
+constexpr double kRealRiseS = 0.0708;
+constexpr double kRealRiseSpreadS = 0.010;
+
+constexpr double kForceStepS = 0.002;  // of the real recordings and of simulated legs
+
+/// Where the counts come to `level` at first from sample `from` on, between samples.
+double crossing(std::span<const double> counts, std::size_t from, double level) {
+  std::size_t i = from;
+  while (i < counts.size() && counts[i] <= level) {
+    ++i;
+  }
+  return i == from || i == counts.size()
+             ? static_cast<double>(i)
+             : static_cast<double>(i) - (counts[i] - level) / (counts[i] - counts[i - 1]);
+}
+
+/// The median of the times in which a foot force sensor rises from a tenth to nine tenths of the
+/// way from swing to the first peak of a stance. A stance begins where counts pass 0.3 of their
+/// range and lasts 0.15 s at least; its first peak is the highest one within 0.12 s, and its swing
+/// the lowest one within 0.1 s before.
+double median_rise_s(std::span<const double> counts) {
+  constexpr std::size_t kPeak = 60;
+  constexpr std::size_t kBefore = 50;
+  constexpr std::size_t kShortest = 75;
+  std::vector<double> sorted(counts.begin(), counts.end());
+  std::ranges::sort(sorted);
+  const double low = sorted.at(sorted.size() / 20);
+  const double begin = low + 0.3 * (sorted.at(sorted.size() * 19 / 20) - low);
+  std::vector<double> rises;
+  for (std::size_t i = kBefore; i + kShortest < counts.size(); ++i) {
+    const auto stance = counts.subspan(i, kShortest);
+    if (counts[i - 1] > begin || *std::ranges::min_element(stance) <= begin) {
+      continue;
+    }
+    const auto before = counts.subspan(i - kBefore, kBefore);
+    const auto lowest = std::ranges::min_element(before);
+    const double peak = *std::ranges::max_element(stance.first(kPeak));
+    const auto from = i - kBefore + static_cast<std::size_t>(lowest - before.begin());
+    rises.push_back(crossing(counts, from, *lowest + 0.9 * (peak - *lowest)) -
+                    crossing(counts, from, *lowest + 0.1 * (peak - *lowest)));
+  }
+  EXPECT_GE(rises.size(), 6U);
+  std::ranges::sort(rises);
+  return rises.empty() ? 0 : kForceStepS * rises.at(rises.size() / 2);
+}
 
 TEST(LegSimulator, TorquesHoldTheSupportForceExactly) {
   const Walk walk = walk_for(12);
@@ -46,7 +96,7 @@ TEST(LegSimulator, TorquesHoldTheSupportForceExactly) {
               .norm(),
           1e-9);
     }
-    EXPECT_LT((sum - required_wrench(body).force).norm(), 1e-9);
+    EXPECT_LT((sum - required_force(body)).norm(), 1e-9);
   }
 }
 
@@ -152,6 +202,36 @@ TEST(LegSimulator, FootForceLagsAndHasAnOffsetByFoot) {
     EXPECT_LE(counts, 60);
   }
   EXPECT_GT(*std::ranges::max_element(lowest) - *std::ranges::min_element(lowest), 1);
+}
+
+TEST(LegSimulator, FootForceRisesAsOnRealFeet) {
+  const Walk walk = walk_for(20);
+  const LegSimulator legs{walk, 1, {}};
+  for (std::size_t l = 0; l < kLegCount; ++l) {
+    std::vector<double> counts;
+    for (std::size_t i = 1750; i < legs.size(); ++i) {
+      counts.push_back(static_cast<double>(legs.reading(i).sample.foot_force.at(l)));
+    }
+    const double rise_s = median_rise_s(counts);
+    RecordProperty("rise_s_" + std::to_string(l), std::to_string(rise_s));
+    EXPECT_NEAR(rise_s, kRealRiseS, kRealRiseSpreadS) << "leg " << l;
+  }
+}
+
+/// The bounds that the simulated feet are held to, by the same estimator on a real Go1's feet on
+/// hard and on slippery floor.
+TEST(LegSimulator, RealFeetRiseWithinTheSameBounds) {
+  GEOFLOW_DATA_OR_SKIP(folder, "foot-contact");
+  for (const char* name : {"GO1_normal_surface.csv", "GO1_slippery_surface.csv"}) {
+    std::ifstream file{folder / name};
+    std::vector<double> counts;
+    for (std::string line; std::getline(file, line);) {
+      counts.push_back(std::stod(line));
+    }
+    const double rise_s = median_rise_s(counts);
+    RecordProperty(std::string{name} + "_rise_s", std::to_string(rise_s));
+    EXPECT_NEAR(rise_s, kRealRiseS, kRealRiseSpreadS) << name;
+  }
 }
 
 TEST(LegSimulator, IsDeterministicAndOneKnobLeavesOtherNoiseAlone) {

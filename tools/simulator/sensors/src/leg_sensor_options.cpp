@@ -33,7 +33,9 @@ constexpr std::array kRows{
         &LegSensorOptions::force_offset_counts, 0, 200},
     Row{"legs.force_counts_per_n", "1/N", "gain of the foot force sensors",
         &LegSensorOptions::force_counts_per_n, 0.1, 20},
-    Row{"legs.force_rise_s", "s", "rise time of the foot force sensors, 10 to 90 percent",
+    Row{"legs.force_rise_s", "s",
+        "rise time of the foot force sensors, 10 to 90 percent of a step; in a trot they "
+        "are at their first peak sooner",
         &LegSensorOptions::force_rise_s, 0, 0.3},
     Row{"legs.force_noise_counts", "", "noise of the foot force sensors",
         &LegSensorOptions::force_noise_counts, 0, 50}};

@@ -36,8 +36,12 @@ constexpr double kFrictionRateRadps = 0.1;
 /// feet.
 constexpr double kLeastOffset = 0.2;
 
-/// A first-order lag rises from 10 to 90 percent in ln(9) of its time constants.
-constexpr double kRiseTimeConstants = 2.1972;
+/// A foot force sensor follows its load through that many equal lags. One alone would be at the
+/// peak of touchdown within 0.03 s.
+constexpr std::size_t kLags = 2;
+/// They rise from 10 to 90 percent of a step in that many of their time constants (Erlang's
+/// distribution of order 2).
+constexpr double kRiseTimeConstants = 3.3579;
 
 double rounded(double value, double step, bool quantise) {
   return quantise ? std::round(value / step) * step : value;
@@ -45,7 +49,7 @@ double rounded(double value, double step, bool quantise) {
 
 LegTruth truth_of(const RobotState& state) {
   LegTruth truth;
-  truth.force_world = support_forces(required_wrench(state.body), state.feet);
+  truth.force_world = support_forces(required_force(state.body), state.feet);
   for (std::size_t i = 0; i < kLegCount; ++i) {
     const FootState& foot = state.feet.at(i);
     truth.contact.at(i) = foot.contact;
@@ -70,20 +74,22 @@ LegSimulator::LegSimulator(const Walk& walk, std::uint64_t seed, const LegSensor
   for (double& offset : force_offset_counts_) {
     offset = options.force_offset_counts * zeros.uniform(kLeastOffset, 1);
   }
-  // The lag, exactly for loads that are constant between two samples.
+  // The lags, exactly for loads that are constant between two samples.
   const double time_constant_s = options.force_rise_s / kRiseTimeConstants;
   const double follow =
       time_constant_s > 0 ? 1 - std::exp(-1 / (options.rate_hz * time_constant_s)) : 1;
   const auto count = static_cast<std::size_t>(std::floor(walk.duration_s() * options.rate_hz)) + 1;
   force_counts_.reserve(count);
+  std::array<std::array<double, kLags>, kLegCount> lagged{};
   for (std::size_t i = 0; i < count; ++i) {
     const LegTruth now = truth(static_cast<double>(i) / options.rate_hz);
     std::array<double, kLegCount> counts{};
     for (std::size_t foot = 0; foot < kLegCount; ++foot) {
-      const double pressed =
-          options.force_counts_per_n * std::max(now.force_world.at(foot).z(), 0.0);
-      const double before = i == 0 ? pressed : force_counts_.back().at(foot);
-      counts.at(foot) = before + follow * (pressed - before);
+      counts.at(foot) = options.force_counts_per_n * std::max(now.force_world.at(foot).z(), 0.0);
+      for (double& lag : lagged.at(foot)) {
+        lag += i == 0 ? counts.at(foot) : follow * (counts.at(foot) - lag);
+        counts.at(foot) = lag;
+      }
     }
     force_counts_.push_back(counts);
   }

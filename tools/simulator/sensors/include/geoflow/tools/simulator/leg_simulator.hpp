@@ -30,7 +30,7 @@ struct LegSensorOptions {
   double leg_mass_scale = 1;
   double force_offset_counts = 45;
   double force_counts_per_n = 5.5;
-  double force_rise_s = 0.07;
+  double force_rise_s = 0.105;
   double force_noise_counts = 1;
   // NOLINTEND(readability-magic-numbers)
 };

@@ -12,21 +12,19 @@ namespace geoflow::simulator {
 /// Standard gravity [m/s^2], along -z of the world.
 inline constexpr double kGravityMps2 = 9.80665;
 
-/// Force and moment about the centre of mass, in world, that the ground must give for the body to
-/// move as it does: its rigid-body inertia and weight.
-struct Wrench {
-  Vector3d force = Vector3d::Zero();         ///< [N]
-  Vector3d moment = Vector3d::Zero();        ///< [Nm]
-  Vector3d centre_world = Vector3d::Zero();  ///< the centre of mass [m]
-};
-[[nodiscard]] Wrench required_wrench(const BodyState& body);
+/// The force, in world [N], that the ground must give for the body's centre of mass to move as it
+/// does: its inertia and weight.
+[[nodiscard]] Vector3d required_force(const BodyState& body);
 
-/// Force of the ground on each foot, in world [N]. Their sum is `wrench.force` exactly; their
-/// moment is `wrench.moment` as far as the feet on the ground allow (two feet cannot turn the body
-/// about the line between them). A foot's share follows its load; no foot pulls unless the body as
-/// a whole falls faster than free.
+/// Force of the ground on each foot, in world [N]: `force_world` split as a standing Go2's feet
+/// split its weight, times each foot's load. The moment of these forces is not what the prescribed
+/// body turns by. A body that is made to turn so does not yield when the feet wander backwards
+/// under it, as a real one does: to balance that moment, two thirds of the load would move from the
+/// rear foot to the front one within each stance, where in a physics simulation of the same trot
+/// (MuJoCo, Unitree's model of the Go2) a foot's part changes by less than a tenth, and real feet
+/// rise alike in front and behind.
 [[nodiscard]] std::array<Vector3d, kLegCount> support_forces(
-    const Wrench& wrench, const std::array<FootState, kLegCount>& feet);
+    const Vector3d& force_world, const std::array<FootState, kLegCount>& feet);
 
 /// Mass of the robot [kg]: Unitree's URDF, with rotors. 157.8 N; a real Go2's standing torques say
 /// 147.3 N, which is the same less the weight that the calves and feet carry themselves
