@@ -21,8 +21,8 @@
 namespace geoflow::simulator {
 namespace {
 
-constexpr float kFaintSignal = 0.06F;   // where disparity's deviation is sqrt(2) of the best
-constexpr float kLeastSignal = 0.008F;  // where half of the pixels have no measurement
+constexpr float kFaintSignal = 0.06F;    // where disparity's deviation is sqrt(2) of the best
+constexpr float kLeastSignal = 0.0045F;  // where half of the pixels have no measurement
 constexpr float kPitchX_px = 8.0F;
 constexpr float kPitchY_px = 6.0F;
 constexpr float kRaggedPitch_px = 5.0F;
@@ -193,10 +193,13 @@ class Matcher {
       const float farthest = std::min(here, std::min(std::min(left, right), std::min(over, under)));
       // A slanted surface has a slope, a step is more than both its sides' slopes.
       const bool step = nearest - farthest >= step_px && nearest + farthest - 2.0F * here != 0.0F;
+      // Only an edge is ragged: a slanted surface is seen where it is.
+      const float own = disparity_at(stretch.x + static_cast<int>(i), stretch.y);
+      const bool beyond_edge = std::abs(here - own) >= step_px;
       const float between = farthest + (nearest - farthest) * stretch.between[i];
       const float beside = stretch.chance[i] < kBetween ? between : here;
       const float torn = stretch.chance[i] < kNothing ? 0.0F : beside;
-      found[i] = step ? torn : here;
+      found[i] = step ? torn : (beyond_edge ? here : own);
     }
     return found;
   }
