@@ -13,6 +13,8 @@ class Candidates {
  public:
   static constexpr std::size_t kMost = 6;  ///< more patches are whatever there is
 
+  [[nodiscard]] bool operator==(const Candidates&) const = default;
+
   constexpr void add_patch(std::uint32_t patch) noexcept {
     const auto known = patches();
     if (std::find(known.begin(), known.end(), patch) != known.end()) {

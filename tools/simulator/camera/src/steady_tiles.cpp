@@ -40,6 +40,7 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
       pinhole_{pinhole},
       walk_m_{rays.people_travel_m(0.5 * shutter.exposure_s)},
       moves_{shutter.exposure_s > 0},
+      anything_{columns_ + 1, rows_ + 1},
       depths_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)),
       centre_(depths_.size()),
       seen_(depths_.size()) {
@@ -158,19 +159,42 @@ void SteadyTiles::spread() {
                 .walk_m = walk_m_};
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
-      const std::size_t here = index(column, row);
-      beyond.nearest_m = std::min(beyond.nearest_m, depths_[here].nearest_m);
-      mark(column, row, reach(column, row, depths_[here]), centre_[here]);
+      beyond.nearest_m = std::min(beyond.nearest_m, depths_[index(column, row)].nearest_m);
     }
+    mark_row(row, 0, columns_ - 1, [&](int column) {
+      const std::size_t here = index(column, row);
+      return Spread{.reach = reach(column, row, depths_[here]), .seen = centre_[here]};
+    });
   }
   Candidates anything;
   anything.add_anything();
   for (int row = -1; moves_ && row <= rows_; ++row) {
-    const bool edge = row < 0 || row == rows_;
-    for (int column = -1; column <= columns_; column += edge ? 1 : columns_ + 1) {
-      mark(column, row, reach(column, row, beyond), anything);
+    const auto from_beyond = [&](int column) {
+      return Spread{.reach = reach(column, row, beyond), .seen = anything};
+    };
+    if (row < 0 || row == rows_) {
+      mark_row(row, -1, columns_, from_beyond);
+    } else {
+      mark_row(row, -1, -1, from_beyond);
+      mark_row(row, columns_, columns_, from_beyond);
     }
   }
+  take_anything();
+}
+
+template <typename SpreadOf>
+void SteadyTiles::mark_row(int row, int first, int last, const SpreadOf& spread_of) {
+  int begin = first;
+  Spread common = spread_of(first);
+  for (int column = first + 1; column <= last; ++column) {
+    const Spread here = spread_of(column);
+    if (!(here == common)) {
+      mark(row, begin, column - 1, common);
+      begin = column;
+      common = here;
+    }
+  }
+  mark(row, begin, last, common);
 }
 
 SteadyTiles::Reach SteadyTiles::reach(int column, int row, const Depths& depths) const {
@@ -207,12 +231,37 @@ SteadyTiles::Reach SteadyTiles::reach(int column, int row, const Depths& depths)
   return {.left = tiles(left), .right = tiles(right), .up = tiles(up), .down = tiles(down)};
 }
 
-void SteadyTiles::mark(int column, int row, const Reach& reach, const Candidates& seen) {
+void SteadyTiles::mark(int row, int first, int last, const Spread& spread) {
+  const Reach& reach = spread.reach;
+  const int top = std::max(0, row - reach.up);
   const int bottom = std::min(rows_ - 1, row + reach.down);
-  const int right = std::min(columns_ - 1, column + reach.right);
-  for (int y = std::max(0, row - reach.up); y <= bottom; ++y) {
-    for (int x = std::max(0, column - reach.left); x <= right; ++x) {
-      seen_[index(x, y)].add(seen);
+  const int left = std::max(0, first - reach.left);
+  const int right = std::min(columns_ - 1, last + reach.right);
+  if (spread.seen.anything() && top <= bottom && left <= right) {
+    // Whatever else these tiles may see does not matter; their sum is taken once.
+    anything_.at(left, top) += 1;
+    anything_.at(right + 1, top) -= 1;
+    anything_.at(left, bottom + 1) -= 1;
+    anything_.at(right + 1, bottom + 1) += 1;
+    return;
+  }
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
+      seen_[index(x, y)].add(spread.seen);
+    }
+  }
+}
+
+void SteadyTiles::take_anything() {
+  for (int y = 0; y < rows_; ++y) {
+    int along = 0;
+    for (int x = 0; x < columns_; ++x) {
+      along += anything_.at(x, y);
+      int& sum = anything_.at(x, y);
+      sum = along + (y > 0 ? anything_.at(x, y - 1) : 0);
+      if (sum > 0) {
+        seen_[index(x, y)].add_anything();
+      }
     }
   }
 }

@@ -62,12 +62,35 @@ class SteadyTiles {
     int right = 0;
     int up = 0;
     int down = 0;
+    [[nodiscard]] bool operator==(const Reach&) const = default;
+  };
+  /// What has a tile in it, and how far.
+  struct Spread {
+    Reach reach;
+    Candidates seen;
+    [[nodiscard]] bool operator==(const Spread&) const = default;
   };
   /// What a tile sees lies between the two, and moves by itself by `walk_m`.
   struct Depths {
     float nearest_m = std::numeric_limits<float>::infinity();
     float farthest_m = 0;
     float walk_m = 0;
+  };
+  /// A number for each tile and for one more row and column: how many rectangles cover it, as
+  /// differences between neighbours (Crow, "Summed-area tables for texture mapping", 1984).
+  class Cover {
+   public:
+    Cover(int columns, int rows)
+        : columns_{columns},
+          counts_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {}
+    [[nodiscard]] int& at(int column, int row) noexcept {
+      return counts_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                     static_cast<std::size_t>(column)];
+    }
+
+   private:
+    int columns_;
+    std::vector<int> counts_;
   };
   /// What one ray meets.
   struct Sight {
@@ -83,13 +106,21 @@ class SteadyTiles {
   void add_outlines(const RayScene& rays);
   void spread();
   [[nodiscard]] Reach reach(int column, int row, const Depths& depths) const;
-  void mark(int column, int row, const Reach& reach, const Candidates& seen);
+  /// Spreads what `spread_of(column)` says of a row's tiles `first` to `last`, equal neighbours
+  /// together.
+  template <typename SpreadOf>
+  void mark_row(int row, int first, int last, const SpreadOf& spread_of);
+  /// Adds what tiles `first` to `last` of a row all have in them to the tiles in their reach.
+  void mark(int row, int first, int last, const Spread& spread);
+  /// Lets the tiles see anything that were marked so.
+  void take_anything();
 
   int columns_;
   int rows_;
   Pinhole pinhole_;
   float walk_m_;                    ///< how far people move during half the exposure
   bool moves_;                      ///< is there time for anything to move in?
+  Cover anything_;                  ///< of what may see anything
   std::vector<View> middles_;       ///< of each row of tiles, in the middle of its exposure
   std::vector<Glances> glances_;    ///< of each row of tiles
   std::vector<Depths> depths_;      ///< of each tile
