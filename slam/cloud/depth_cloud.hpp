@@ -45,6 +45,8 @@ struct Surfel {
   float tilt_variance = 0;  ///< of the normal's direction, about each tangent [rad^2]
 
   [[nodiscard]] bool valid() const noexcept { return normal_variance > 0.0F; }
+  /// Whether point and normal tell the depth here: also where the view is too steep for valid().
+  [[nodiscard]] bool has_depth() const noexcept { return point.z() > 0.0F; }
 };
 
 /// A depth image as an organised grid of surfels: at most one a cell of the CellGrid. One pass over

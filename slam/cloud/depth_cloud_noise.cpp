@@ -178,7 +178,7 @@ void DepthCloud::drop_grazing() {
   for (const std::uint32_t cell : valid_) {
     const Surfel& surfel = surfels_[cell];
     if (-surfel.normal.dot(surfel.point) < min_cosine_ * surfel.point.norm()) {
-      surfels_[cell] = Surfel{};
+      surfels_[cell].normal_variance = 0;
     }
   }
   std::erase_if(valid_, [this](std::uint32_t cell) { return !surfels_[cell].valid(); });

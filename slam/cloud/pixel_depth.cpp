@@ -82,7 +82,7 @@ const Surfel* surface_at(const DepthCloud& cloud, const Eigen::Vector2d& raw,
       const int in_row_order = y * grid.columns() + x;
       const Surfel& surfel = cloud.surfels()[static_cast<std::size_t>(in_row_order)];
       const int distance = (Eigen::Vector2i{x, y} - middle).squaredNorm();
-      if (distance < least && surfel.valid() && goes_on(surfel)) {
+      if (distance < least && surfel.has_depth() && goes_on(surfel)) {
         nearest = &surfel;
         least = distance;
       }
@@ -91,7 +91,8 @@ const Surfel* surface_at(const DepthCloud& cloud, const Eigen::Vector2d& raw,
   return nearest;
 }
 
-double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vector2d& raw) {
+double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vector2d& raw,
+                double expected_m) {
   const CellGrid& grid = cloud.grid();
   const double measured = median_depth(depth, raw) * cloud.pixels().unit_m;
   const std::optional<std::size_t> cell = cell_at(grid, raw);
@@ -99,19 +100,27 @@ double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vec
     return measured;
   }
   const Surfel& surfel = cloud.surfels()[*cell];
-  if (!surfel.valid()) {
+  if (!surfel.has_depth()) {
     return 0;
   }
   const CellGrid::Ray& ray = grid.ray(*cell);
   const Eigen::Vector2d middle =
       ((raw.array() / grid.cell_px()).floor() + 0.5) * grid.cell_px() - 0.5;
-  const Eigen::Vector2d at =
-      ray.centre.cast<double>() + ray.per_pixel.cast<double>() * (raw - middle);
   const Eigen::Vector3d normal = surfel.normal.cast<double>();
-  const double inverse_depth =
-      normal.dot(at.homogeneous()) / normal.dot(surfel.point.cast<double>());
+  const auto inverse_depth_at = [&](const Eigen::Vector2d& pixel) {
+    const Eigen::Vector2d at =
+        ray.centre.cast<double>() + ray.per_pixel.cast<double>() * (pixel - middle);
+    return normal.dot(at.homogeneous()) / normal.dot(surfel.point.cast<double>());
+  };
+  const double inverse_depth = inverse_depth_at(raw);
+  // A steep view of a floor may show what it mirrors: behind the floor, whatever its texture.
+  constexpr double kAgrees = 0.1;
+  if (!surfel.valid() && !(std::abs(expected_m * inverse_depth - 1.0) < kAgrees)) {
+    return 0;
+  }
   constexpr double kOnSurfaceSigmas = 3.0;
-  const double off = std::abs(inverse_depth - 1.0 / measured);
+  const Eigen::Vector2d measured_at = raw.array().round();
+  const double off = std::abs(inverse_depth_at(measured_at) - 1.0 / measured);
   return off < kOnSurfaceSigmas * static_cast<double>(cloud.sigma()) ? 1.0 / inverse_depth : 0;
 }
 

@@ -47,15 +47,15 @@ struct Frame {
   bool anchored = true;
 
   /// The feature that is seen at a raw pixel, where the middle of the image would have shown it:
-  /// depth, of a global shutter, is of that time. `expected_depth_m`: taken where none is measured;
-  /// 0: unknown.
+  /// depth, of a global shutter, is of that time. `expected_depth_m`: what is known of it
+  /// otherwise; 0: unknown.
   [[nodiscard]] Feature feature_at(const Vector2d& raw, const CameraModel& camera,
                                    double expected_depth_m = 0) const;
 
  private:
   /// Measured depth [m] at a raw pixel; 0: none.
-  [[nodiscard]] double depth_at(const Vector2d& raw) const {
-    return cloud ? slam::depth_at(*cloud, depth, raw) : 0;
+  [[nodiscard]] double depth_at(const Vector2d& raw, double expected_m) const {
+    return cloud ? slam::depth_at(*cloud, depth, raw, expected_m) : 0;
   }
 };
 

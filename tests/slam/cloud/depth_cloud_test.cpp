@@ -202,6 +202,21 @@ TEST(PixelDepth, IsThatOfTheSurfaceAndNoneOnItsEdge) {
   EXPECT_GT(edges, 50U);
 }
 
+TEST(PixelDepth, OfASteepViewCountsOnlyWhereParallaxAgrees) {
+  // A floor 0.4 m below the camera, of which everything beyond 1.9 m is seen too steeply for a
+  // surfel: what shows there may be mirrored.
+  const Scene floor{{.normal = Vector3d::UnitY(), .offset = 0.4}};
+  const FrameRef image =
+      render(floor, SE3{}, vga_camera(), kUnitM, {.inverse_depth_sigma = 1e-3, .blur_px = 3});
+  const DepthCloud cloud = cloud_of(image);
+  const Eigen::Vector2d raw{300, vga_camera().cy + vga_camera().fy * 0.4 / 2.5};
+  EXPECT_EQ(depth_at(cloud, image, raw), 0);
+  EXPECT_NEAR(depth_at(cloud, image, raw, 2.4), 2.5, 0.05);
+  EXPECT_EQ(depth_at(cloud, image, raw, 4.0), 0) << "what the floor mirrors";
+  const Eigen::Vector2d near{300, vga_camera().cy + vga_camera().fy * 0.4 / 1.2};
+  EXPECT_NEAR(depth_at(cloud, image, near), 1.2, 0.02);
+}
+
 TEST(DepthCloud, HolesAndEmptyImages) {
   const DepthCloud holes =
       cloud_of(render(wall(), SE3{}, vga_camera(), kUnitM, {.hole_probability = 0.3}));
