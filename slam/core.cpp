@@ -1,7 +1,5 @@
 #include "geoflow/slam/core.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -34,6 +32,7 @@
 #include "map/map_correction.hpp"
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
+#include "odometry/pose_optimiser.hpp"
 #include "odometry/tracker.hpp"
 #include "optimisation/matrix6.hpp"
 #include "place/loop_closer.hpp"
@@ -177,9 +176,13 @@ class Core::Impl {
   }
 
   PoseEstimate follow(const SyncedPacket& packet, const std::optional<ReckonedMotion>& motion) {
-    const TrackingResult result = tracker_.track(map_, {.prior = motion_.predict(packet.t, motion),
-                                                        .by = source_of(motion),
-                                                        .since_keyframe = since_keyframe()});
+    const std::optional<PosePrior> reckoned = since_keyframe();
+    // From the keyframe on, what has pulled at the frames before is not carried along.
+    const bool by_keyframe = reckoned && frames_lost_ == 0;
+    const TrackingResult result =
+        tracker_.track(map_, {.prior = by_keyframe ? *reckoned : motion_.predict(packet.t, motion),
+                              .by = source_of(motion),
+                              .since_keyframe = reckoned});
     const SE3 T_odom_cam = tracker_.current().T_odom_cam;
     const bool fixed = result.anchored && (result.visual_fix || result.depth_fix);
     frames_lost_ = fixed ? 0 : frames_lost_ + 1;
@@ -200,7 +203,7 @@ class Core::Impl {
     estimate.covariance = A * covariance * A.transpose();
     estimate.status =
         fixed && result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
-    estimate.quality = quality(result);
+    estimate.quality = result.quality();
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       keyframe_due_ = covariance;
       // Legs tie what they were heard all the way between; without them nothing does.
@@ -286,14 +289,6 @@ class Core::Impl {
     return motion->legs ? PoseSource::kLegs : PoseSource::kImu;
   }
 
-  static std::uint8_t quality(const TrackingResult& result) {
-    constexpr double kPlentyOfPoints = 100;
-    constexpr double kFull = 100;
-    const double visual = std::min(1.0, result.solution.visual_inliers / kPlentyOfPoints);
-    const double depth = result.depth_fix ? result.overlap : 0;
-    return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
-  }
-
   [[nodiscard]] bool needs_keyframe(const SyncedPacket& packet, const TrackingResult& result,
                                     const SE3& T_odom_cam) const {
     const Keyframe& reference = map_.keyframe(reference_);
@@ -303,13 +298,14 @@ class Core::Impl {
     const Vector6d moved = (reference.T_odom_cam.inverse() * T_odom_cam).log();
     const bool new_view =
         moved.tail<3>().norm() > kSameViewM || moved.head<3>().norm() > kSameViewRad;
+    const bool old = packet.t - reference.t > config_.keyframes.maximum_interval;
     const double share = static_cast<double>(result.solution.visual_inliers) /
                          static_cast<double>(reference.points.size() + 1);
     return moved.tail<3>().norm() > config_.keyframes.translation_m ||
            moved.head<3>().norm() > config_.keyframes.rotation_rad ||
            (new_view && share < config_.keyframes.overlap / 2) ||
            (new_view && result.depth_fix && result.overlap < config_.keyframes.overlap) ||
-           packet.t - reference.t > config_.keyframes.maximum_interval;
+           (old && (new_view || share < config_.keyframes.overlap));
   }
 
   void insert_keyframe(const Matrix6d& covariance) {
@@ -323,10 +319,14 @@ class Core::Impl {
     if (map_.keyframes().size() > 1) {
       pending_ = reference_;
       if (since_keyframe_) {
-        map_.add_edge({.from = before,
-                       .to = reference_,
-                       .T_from_to = since_keyframe_->T_cam0_cam1,
-                       .information = inverse(since_keyframe_->covariance)});
+        const RelativeEdge edge{.from = before,
+                                .to = reference_,
+                                .T_from_to = since_keyframe_->T_cam0_cam1,
+                                .information = inverse(since_keyframe_->covariance)};
+        map_.add_edge(edge);
+        if (since_keyframe_->legs) {
+          map_.keyframe(reference_).reckoned = edge;
+        }
       }
     }
     since_keyframe_ = ReckonedMotion{.T_cam0_cam1 = SE3{}, .legs = true};

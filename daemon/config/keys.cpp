@@ -127,7 +127,7 @@ void bind_mapping(slam::MappingConfig& c, std::vector<Key>& keys) {
   keys.push_back({"slam.mapping.fixed", &fixed, 1, 200});
   keys.push_back({"slam.mapping.map_neighbours", &map_neighbours, 0, 50});
   keys.push_back({"slam.mapping.iterations", &iterations, 1, 100});
-  keys.push_back({"slam.mapping.depth_sigma_at_1m", &depth_sigma, 1e-5, 1});
+  keys.push_back({"slam.mapping.inverse_depth_sigma", &depth_sigma, 1e-5, 1});
 }
 
 void bind_slam(slam::Config& c, std::vector<Key>& keys) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "geoflow/hal/geometry.hpp"
@@ -59,7 +60,10 @@ struct Keyframe {
   std::shared_ptr<const PlaceView> place;             ///< null until describe() gives it
   std::shared_ptr<const ImagePyramid> pyramid;        ///< null where it was let go
   RowMotion rows{};                                   ///< while the pyramid's image was read out
-  std::vector<PointId> points;                        ///< that it observes
+  /// What legs and IMU say of the motion since the keyframe before; none: not all the way, or of
+  /// another run.
+  std::optional<RelativeEdge> reckoned{};
+  std::vector<PointId> points;  ///< that it observes
 };
 
 /// All that a map is made of. Copies share what is heavy: a snapshot costs little.

@@ -29,6 +29,7 @@
 #include "map/overlap.hpp"
 #include "map/point_search.hpp"
 #include "odometry/frame.hpp"
+#include "optimisation/matrix6.hpp"
 #include "vision/orb_features.hpp"
 #include "vision/place_view.hpp"
 
@@ -55,6 +56,26 @@ std::optional<Vector3d> intersect(const Vector3d& origin_a, const Vector3d& ray_
     return std::nullopt;
   }
   return 0.5 * (origin_a + depth.x() * ray_a + origin_b + depth.y() * ray_b);
+}
+
+/// All that legs and IMU say of the motion from one keyframe to a later one.
+std::optional<RelativeEdge> reckoned_between(const Map& map, KeyframeId from, KeyframeId to) {
+  KeyframeId reached = to;
+  SE3 T_reached_to;
+  Matrix6d covariance = Matrix6d::Zero();
+  while (reached != from) {
+    const std::optional<RelativeEdge>& step = map.keyframe(reached).reckoned;
+    if (!step || step->from < from) {
+      return std::nullopt;
+    }
+    const Matrix6d A = T_reached_to.inverse().adjoint();
+    covariance += A * inverse(step->information) * A.transpose();
+    const SE3& T_before_reached = step->T_from_to;
+    T_reached_to = T_before_reached * T_reached_to;  // frames: reached is now the one before
+    reached = step->from;
+  }
+  return RelativeEdge{
+      .from = from, .to = to, .T_from_to = T_reached_to, .information = inverse(covariance)};
 }
 
 }  // namespace
@@ -174,8 +195,7 @@ void MapBuilder::add_features(Map& map, KeyframeId keyframe, Frame& frame) {
   }
 }
 
-std::vector<std::pair<KeyframeId, KeyframeId>> MapBuilder::edges_to_measure(
-    const Map& map, KeyframeId newest) const {
+std::vector<EdgeToMeasure> MapBuilder::edges_to_measure(const Map& map, KeyframeId newest) const {
   const Keyframe& center = map.keyframe(newest);
   if (!center.cloud) {
     return {};
@@ -189,10 +209,10 @@ std::vector<std::pair<KeyframeId, KeyframeId>> MapBuilder::edges_to_measure(
   std::erase_if(overlapping, [&](const OverlappingKeyframe& k) {
     return k.id == newest || !local.contains(k.id) || !wanted(k.id);
   });
-  std::vector<std::pair<KeyframeId, KeyframeId>> edges;
+  std::vector<EdgeToMeasure> edges;
   for (const KeyframeId id : registration_targets(
            overlapping, static_cast<std::size_t>(config_.mapping.map_neighbours))) {
-    edges.emplace_back(id, newest);
+    edges.push_back({.from = id, .to = newest, .reckoned = reckoned_between(map, id, newest)});
   }
   return edges;
 }
@@ -217,8 +237,8 @@ std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<K
   for (const RelativeEdge& edge : map.edges()) {
     connect(edge.from, edge.to);
   }
-  for (const auto& [from, to] : problem.edges_to_measure) {
-    connect(from, to);
+  for (const EdgeToMeasure& pair : problem.edges_to_measure) {
+    connect(pair.from, pair.to);
   }
   std::vector<std::pair<std::size_t, KeyframeId>> by_connection;
   by_connection.reserve(connection.size());
@@ -276,7 +296,7 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
   }
   std::copy_if(map.edges().begin(), map.edges().end(), std::back_inserter(problem->edges),
                [&](const RelativeEdge& e) { return inside(e.from) && inside(e.to); });
-  std::erase_if(problem->edges_to_measure, [&](const auto& pair) { return !inside(pair.first); });
+  std::erase_if(problem->edges_to_measure, [&](const auto& pair) { return !inside(pair.from); });
   return {.problem = problem};
 }
 

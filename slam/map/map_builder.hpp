@@ -41,8 +41,8 @@ class MapBuilder {
  private:
   /// Pairs of keyframes whose depth is to be registered: the newest with those that see what it
   /// sees.
-  [[nodiscard]] std::vector<std::pair<KeyframeId, KeyframeId>> edges_to_measure(
-      const Map& map, KeyframeId newest) const;
+  [[nodiscard]] std::vector<EdgeToMeasure> edges_to_measure(const Map& map,
+                                                            KeyframeId newest) const;
   /// Keyframes outside the window that are most connected with it, by points and by edges: its
   /// anchors.
   [[nodiscard]] std::set<KeyframeId> held_keyframes(const Map& map,

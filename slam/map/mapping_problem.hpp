@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -31,12 +32,19 @@ struct MappingPoint {
   std::vector<Observation> observations;  ///< only by keyframes of the problem
 };
 
+/// A pair of keyframes whose depth is to be registered first.
+struct EdgeToMeasure {
+  KeyframeId from{};
+  KeyframeId to{};
+  /// What legs and IMU alone say of their motion; none where they were not heard all the way.
+  std::optional<RelativeEdge> reckoned{};
+};
+
 struct MappingProblem {
   std::vector<MappingKeyframe> keyframes;  ///< in order of id; at least one is fixed
   std::vector<MappingPoint> points;
   std::vector<RelativeEdge> edges;  ///< known ones between keyframes of the problem
-  std::vector<std::pair<KeyframeId, KeyframeId>>
-      edges_to_measure;  ///< pairs whose depth is to be registered first
+  std::vector<EdgeToMeasure> edges_to_measure;
   CameraIntrinsics camera;
   PoseConfig pose;
   MappingConfig mapping;

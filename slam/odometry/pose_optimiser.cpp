@@ -13,6 +13,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "cloud/gicp.hpp"
+#include "optimisation/agreement.hpp"
 #include "optimisation/matrix6.hpp"
 
 namespace geoflow::slam {
@@ -101,9 +102,9 @@ void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam
     system.H += weight * J.transpose() * J;
     system.gradient += weight * J.transpose() * r;
     if (match.depth_m > 0) {
-      const double sigma_m = mapping_.depth_sigma_at_1m * match.depth_m * match.depth_m;
-      const double rz = (p_cam.z() - match.depth_m) / sigma_m;
-      const Eigen::Matrix<double, 1, 6> J_z = J_point.row(2) / sigma_m;
+      const double sigma = mapping_.inverse_depth_sigma;
+      const double rz = (1 / p_cam.z() - 1 / match.depth_m) / sigma;
+      const Eigen::Matrix<double, 1, 6> J_z = J_point.row(2) / (-p_cam.z() * p_cam.z() * sigma);
       const double weight_z = weight * cauchy_weight(rz * rz);
       system.H += weight_z * J_z.transpose() * J_z;
       system.gradient += weight_z * J_z.transpose() * rz;
@@ -111,25 +112,31 @@ void PoseOptimiser::add_visual(const PoseProblem& problem, const SE3& T_odom_cam
   }
 }
 
-void PoseOptimiser::add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
-                              const SE3& T_odom_cam, System& system) const {
+DepthInformation PoseOptimiser::depth_system(const PoseProblem& problem,
+                                             std::span<const SurfelSample> sample,
+                                             const SE3& T_odom_cam, std::uint32_t& inliers) const {
   NormalEquations sum;
   for (const DepthTarget& target : problem.targets) {
     // A right perturbation of T_target_cam is one of T_odom_cam, so the systems simply add.
     const SE3 T_target_cam = target.T_odom_target.inverse() * T_odom_cam;
     const NormalEquations equations =
         linearise(*problem.cloud, sample, *target.cloud, T_target_cam, gicp_);
-    system.depth_inliers =
-        std::max(system.depth_inliers, static_cast<std::uint32_t>(equations.inliers));
+    inliers = std::max(inliers, static_cast<std::uint32_t>(equations.inliers));
     sum += equations;
   }
-  if (sum.inliers > 0) {
-    // The targets see the same surfaces, with the same errors: together they count as one.
-    const double share = 1.0 / static_cast<double>(problem.targets.size());
-    const DepthInformation depth = constrained(sum, gicp_);
-    system.H += share * depth.H;
-    system.gradient += share * depth.b;
+  if (sum.inliers == 0) {
+    return {};
   }
+  // The targets see the same surfaces, with the same errors: together they count as one.
+  const double share = 1.0 / static_cast<double>(problem.targets.size());
+  const DepthInformation depth = constrained(sum, gicp_);
+  return {.H = share * depth.H, .b = share * depth.b};
+}
+
+Matrix6d PoseOptimiser::agreed_by(const PosePrior& belief, const DepthInformation& depth,
+                                  const SE3& T_odom_cam) {
+  const Vector6d from_belief = (belief.T_odom_cam.inverse() * T_odom_cam).log();
+  return agreeing(depth.H, depth.b - depth.H * from_belief, inverse(belief.information));
 }
 
 void PoseOptimiser::classify(std::span<const VisualMatch> matches, const std::vector<bool>& allowed,
@@ -170,11 +177,18 @@ PoseSolution PoseOptimiser::solve(const PoseProblem& whole, const SE3& start) co
     sample = select(*problem.cloud, static_cast<std::size_t>(config_.gicp_surfels));
     solution.depth_surfels = static_cast<std::uint32_t>(sample.size());
   }
+  Matrix6d agreed = Matrix6d::Identity();
   for (int i = 0; i < config_.iterations; ++i) {
     System system;
     solution.pixel_sigma = pixel_sigma(problem, solution.T_odom_cam);
     add_visual(problem, solution.T_odom_cam, solution.pixel_sigma, system);
-    add_depth(problem, sample, solution.T_odom_cam, system);
+    const DepthInformation depth =
+        depth_system(problem, sample, solution.T_odom_cam, system.depth_inliers);
+    if (i == 0 && problem.reckoned) {
+      agreed = agreed_by(*problem.reckoned, depth, solution.T_odom_cam);
+    }
+    system.H += agreed.transpose() * depth.H * agreed;
+    system.gradient += agreed.transpose() * depth.b;
     const Vector6d from_prior = (problem.prior.T_odom_cam.inverse() * solution.T_odom_cam).log();
     system.gradient += problem.prior.information * from_prior;
     const Eigen::LDLT<Matrix6d> H{system.H + problem.prior.information};

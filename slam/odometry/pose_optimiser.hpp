@@ -41,9 +41,9 @@ struct PoseProblem {
   std::span<const DepthTarget> targets;
   PosePrior prior;  ///< the prediction: decides what nothing else sees
   /// Where legs and IMU alone see the camera, from the last keyframe on: matches that contradict it
-  /// are left out, and no inliers. Things that move by themselves do, and mirror images: those
-  /// follow the camera by so little in each frame that only the whole way tells them from what they
-  /// are seen on.
+  /// are left out, and no inliers, and so is what depth says in directions in which it does. Things
+  /// that move by themselves do, and mirror images: those follow the camera by so little in each
+  /// frame that only the whole way tells them from what they are seen on.
   std::optional<PosePrior> reckoned{};
 };
 
@@ -66,9 +66,9 @@ struct PoseSolution {
 
 /// Robust Gauss-Newton from `start`. Residuals:
 ///   reprojection  r_v = pi(T^-1 p) - u              (equation (3)), Cauchy kernel
-///   depth         r_z = [T^-1 p]_z - z              Cauchy kernel, sigma growing with z^2
-///   GICP          distribution to distribution against every target at once (equation (5))
-///   prior         log(T_prior^-1 T)
+///   depth         r_z = 1 / [T^-1 p]_z - 1 / z      Cauchy kernel; why the inverse:
+///   PointDepthFactor GICP          distribution to distribution against every target at once
+///   (equation (5)) prior         log(T_prior^-1 T)
 /// The visual standard deviation is estimated from the residuals themselves in every step (median),
 /// never below PoseConfig::pixel_sigma: a camera whose colour does not fit its depth thereby yields
 /// to the depth, without a switch.
@@ -91,8 +91,13 @@ class PoseOptimiser {
   [[nodiscard]] double pixel_sigma(const PoseProblem& problem, const SE3& T_odom_cam) const;
   void add_visual(const PoseProblem& problem, const SE3& T_odom_cam, double sigma_px,
                   System& system) const;
-  void add_depth(const PoseProblem& problem, std::span<const SurfelSample> sample,
-                 const SE3& T_odom_cam, System& system) const;
+  /// What the depth says at T_odom_cam; `inliers`: see PoseSolution::depth_inliers.
+  [[nodiscard]] DepthInformation depth_system(const PoseProblem& problem,
+                                              std::span<const SurfelSample> sample,
+                                              const SE3& T_odom_cam, std::uint32_t& inliers) const;
+  /// agreeing() of the depth at T_odom_cam, near the belief's mean.
+  [[nodiscard]] static Matrix6d agreed_by(const PosePrior& belief, const DepthInformation& depth,
+                                          const SE3& T_odom_cam);
   /// Which matches fit the solution, of those that are allowed.
   void classify(std::span<const VisualMatch> matches, const std::vector<bool>& allowed,
                 PoseSolution& solution) const;

@@ -1,6 +1,7 @@
 #include "odometry/tracker.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -46,6 +47,14 @@ constexpr double kTargetOverlap = 0.5;
 constexpr double kDepthCarriesOn = 0.5;
 
 }  // namespace
+
+std::uint8_t TrackingResult::quality() const {
+  constexpr double kPlentyOfPoints = 100;
+  constexpr double kFull = 100;
+  const double visual = std::min(1.0, solution.visual_inliers / kPlentyOfPoints);
+  const double depth = depth_fix ? overlap : 0;
+  return static_cast<std::uint8_t>(std::lround(kFull * std::max(visual, depth)));
+}
 
 Tracker::Tracker(const Config& config, const GicpConfig& gicp, const Calibration& calibration,
                  std::shared_ptr<const CellGrid> grid, StageObserver* observer)
@@ -293,15 +302,15 @@ Tracker::InitialPose Tracker::first_guess(const Map& map, const InitialPose& pre
 
 std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odom_cam, bool blind,
                                                 double& overlap) {
-  std::vector<DepthTarget> targets;
   if (!current_.cloud) {
-    return targets;
+    return {};
   }
+  std::vector<DepthTarget> by_step;
   if (config_.switches.gicp && previous_.cloud && !blind) {
-    targets.push_back({previous_.cloud.get(), previous_.T_odom_cam});
+    by_step.push_back({previous_.cloud.get(), previous_.T_odom_cam});
   }
   if (!current_.anchored) {
-    return targets;
+    return by_step;
   }
   auto overlapping = overlapping_keyframes(map, *current_.cloud, T_odom_cam, kTargetOverlap);
   if (const KeyframeId newest = map.keyframes().rbegin()->first;
@@ -310,13 +319,16 @@ std::vector<DepthTarget> Tracker::depth_targets(const Map& map, const SE3& T_odo
   }
   std::erase_if(overlapping, [&](const auto& k) { return !local_map_->contains(k.id); });
   overlap = overlapping.empty() ? 0 : overlapping.front().overlap;
+  std::vector<DepthTarget> in_map;
   if (config_.switches.depth_to_map) {
     for (const KeyframeId id :
          registration_targets(overlapping, static_cast<std::size_t>(config_.pose.map_targets))) {
-      targets.push_back({map.keyframe(id).cloud.get(), map.keyframe(id).T_odom_cam});
+      in_map.push_back({map.keyframe(id).cloud.get(), map.keyframe(id).T_odom_cam});
     }
   }
-  return targets;
+  // What walks has hardly moved since the frame before, and would take the pose along; since a
+  // keyframe it has.
+  return in_map.empty() ? by_step : in_map;
 }
 
 TrackingResult Tracker::track(Map& map, const Prediction& predicted) {

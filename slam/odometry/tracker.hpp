@@ -40,11 +40,14 @@ struct TrackingResult {
   Matrix6d covariance = Matrix6d::Zero();
   double depth_share = 0;  ///< share of the frame's depth that agrees with the map, 0 to 1
   double overlap = 0;  ///< largest share of the frame's depth that one keyframe sees too, 0 to 1
+
+  /// PoseEstimate::quality: how much of what could be seen carries the pose, 0 to 100.
+  [[nodiscard]] std::uint8_t quality() const;
 };
 
 /// What is known of a frame's pose before it is looked at.
 struct Prediction {
-  PosePrior prior;  ///< from the frame before
+  PosePrior prior;  ///< from the last keyframe, by legs and IMU, or from the frame before
   PoseSource by{};  ///< what made it
   /// By legs and IMU alone from the last keyframe on; none where they do not know all of the way.
   std::optional<PosePrior> since_keyframe{};

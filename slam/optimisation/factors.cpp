@@ -96,8 +96,12 @@ bool ReprojectionFactor::Evaluate(const double* const* parameters, double* resid
 bool PointDepthFactor::Evaluate(const double* const* parameters, double* residuals,
                                 double** jacobians) const {
   const CameraPoint point{parameters[0], parameters[1]};
-  residuals[0] = (point.p_cam.z() - depth_m_) / sigma_m_;
-  point.chain<1>(Eigen::RowVector3d::UnitZ() / sigma_m_, jacobians);
+  const double z = point.p_cam.z();
+  if (z < kMinimumDepthM) {
+    return false;
+  }
+  residuals[0] = (1 / z - 1 / depth_m_) / sigma_;
+  point.chain<1>(Eigen::RowVector3d::UnitZ() / (-z * z * sigma_), jacobians);
   return true;
 }
 

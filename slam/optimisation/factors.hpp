@@ -50,16 +50,18 @@ class ReprojectionFactor final : public ceres::SizedCostFunction<2, kPoseSize, 3
   double sigma_px_;
 };
 
-/// Measured depth of a point: ([T^-1 p]_z - z) / sigma; parameters: pose, point (odom) [m].
+/// Measured depth of a point: (1 / [T^-1 p]_z - 1 / z) / sigma; parameters: pose, point (odom) [m].
+/// What a triangulating sensor errs by is the same at all depths in the inverse alone: weighed by a
+/// sigma that grows with the measured z^2, depths that err towards the camera count for more.
 class PointDepthFactor final : public ceres::SizedCostFunction<1, kPoseSize, 3> {
  public:
-  PointDepthFactor(double depth_m, double sigma_m) : depth_m_{depth_m}, sigma_m_{sigma_m} {}
+  PointDepthFactor(double depth_m, double sigma) : depth_m_{depth_m}, sigma_{sigma} {}
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   double depth_m_;
-  double sigma_m_;
+  double sigma_;
 };
 
 /// Relative pose of two cameras (paper, equation (5)): W log(Z^-1 Ta^-1 Tb), with W^T W the

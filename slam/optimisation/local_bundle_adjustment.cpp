@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -20,7 +21,9 @@
 #include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
+#include "optimisation/agreement.hpp"
 #include "optimisation/factors.hpp"
+#include "optimisation/matrix6.hpp"
 #include "optimisation/pose_graph.hpp"
 #include "place/loop_closer.hpp"
 #include "vision/camera_model.hpp"
@@ -62,15 +65,30 @@ class LocalBundleAdjustment {
   [[nodiscard]] const PoseBlock& pose(KeyframeId id) const { return poses_[index_.at(id)]; }
 
   void measure_edges() {
-    for (const auto& [from, to] : problem_.edges_to_measure) {
-      const MappingKeyframe& a = keyframe(from);
-      const MappingKeyframe& b = keyframe(to);
+    for (const EdgeToMeasure& pair : problem_.edges_to_measure) {
+      const MappingKeyframe& a = keyframe(pair.from);
+      const MappingKeyframe& b = keyframe(pair.to);
       const RegistrationResult found =
           register_clouds(*b.cloud, *a.cloud, a.T_odom_cam.inverse() * b.T_odom_cam, problem_.gicp);
       if (found.converged) {
-        solution_->measured.push_back({from, to, found.T_target_source, found.information});
+        solution_->measured.push_back(
+            {pair.from, pair.to, found.T_target_source, believable(found, pair.reckoned)});
       }
     }
+  }
+
+  /// The information of a registration, but for what contradicts legs and IMU: depth of what walks.
+  static Matrix6d believable(const RegistrationResult& found,
+                             const std::optional<RelativeEdge>& reckoned) {
+    if (!reckoned) {
+      return found.information;
+    }
+    const SE3 T_to_from = reckoned->T_from_to.inverse();
+    const SE3& T_from_to = found.T_target_source;
+    const Vector6d off = (T_to_from * T_from_to).log();
+    const Matrix6d agreed =
+        agreeing(found.information, -found.information * off, inverse(reckoned->information));
+    return agreed.transpose() * found.information * agreed;
   }
 
   [[nodiscard]] Vector2d residual(const Observation& observation, const Vector3d& p_odom) const {
@@ -127,10 +145,8 @@ class LocalBundleAdjustment {
         add_factor<ReprojectionFactor>(&visual_loss_, {pose_block, block}, camera_,
                                        observation.pixel, sigma_px_);
         if (observation.depth_m > 0) {
-          const double sigma_m =
-              problem_.mapping.depth_sigma_at_1m * observation.depth_m * observation.depth_m;
           add_factor<PointDepthFactor>(&visual_loss_, {pose_block, block}, observation.depth_m,
-                                       sigma_m);
+                                       problem_.mapping.inverse_depth_sigma);
         }
       }
     }

@@ -10,7 +10,11 @@
 #include <gtest/gtest.h>
 
 #include "geoflow/hal/geometry.hpp"
+#include "geoflow/slam/config.hpp"
 
+#include "cloud/depth_cloud.hpp"
+#include "synthetic_scene.hpp"
+#include "views.hpp"
 #include "vision/camera_model.hpp"
 
 /// Points in front of a camera, some of which move on their own.
@@ -145,6 +149,57 @@ TEST_F(PoseOptimiserTest, TheCovarianceIsThatOfTheErrors) {
   }
   EXPECT_GT(normalised / kTries, 0.7);
   EXPECT_LT(normalised / kTries, 1.4);
+}
+
+TEST_F(PoseOptimiserTest, DepthThatErrsAsTriangulationDoesHoldsThePoseNeitherBackNorPushesIt) {
+  // Beyond a few metres a sensor errs by per cents: weighed by a sigma that grows with what was
+  // measured, the nearer of two depths counts for more, and 2000 of them come out 25 mm too near.
+  constexpr double kInverseSigma = 0.02;
+  std::mt19937_64 random{11};
+  std::normal_distribution<double> noise{0, kInverseSigma};
+  auto seen = matches(T_odom_cam_, 2000, 0, Vector3d::Zero());
+  for (VisualMatch& match : seen) {
+    const Vector3d p_cam = T_odom_cam_.inverse() * match.p_odom;
+    match.depth_m = 1 / (1 / p_cam.z() + noise(random));
+    // Pixels that say nothing of the way forward leave it to depth alone.
+    match.pixel = pinhole.project(p_cam);
+  }
+  const PosePrior prior = prior_of(T_odom_cam_, 1e-5, 1);
+  PoseConfig blurred;
+  blurred.pixel_sigma = 1e3;
+  const PoseOptimiser by_depth{blurred, {.inverse_depth_sigma = kInverseSigma}, {}, pinhole};
+  const PoseSolution solution =
+      by_depth.solve({.matches = seen, .targets = {}, .prior = prior}, T_odom_cam_);
+  const double along = (T_odom_cam_.inverse() * solution.T_odom_cam).translation().z();
+  const double sigma = std::sqrt(solution.covariance(5, 5));
+  RecordProperty("along_m", std::to_string(along));
+  EXPECT_LT(sigma, 0.01);
+  EXPECT_LT(std::abs(along), 3 * sigma);
+}
+
+TEST_F(PoseOptimiserTest, SomeoneWhoWalksTowardsTheCameraDoesNotMoveItWhereLegsSayThatItStands) {
+  // A corridor without an end: of the way along it nothing tells but who walks there.
+  const auto seen = [](double person_at_m, std::uint64_t seed) {
+    tests::Scene scene = tests::corridor();
+    scene.push_back({.normal = Vector3d::UnitZ(),
+                     .offset = person_at_m,
+                     .low = {-0.4, -0.9, 0},
+                     .high = {0.4, 0.8, 10}});
+    return tests::view(scene, SE3{}, seed, {.inverse_depth_sigma = 3e-3, .blur_px = 5});
+  };
+  const DepthCloud before = seen(2.0, 1);
+  const DepthCloud now = seen(1.97, 2);
+  const std::vector<DepthTarget> targets{{.cloud = &before, .T_odom_target = SE3{}}};
+  const PosePrior prior = prior_of(SE3{}, 5e-4, 0.02);
+  const PoseProblem trusting{.matches = {}, .cloud = &now, .targets = targets, .prior = prior};
+  PoseProblem judging = trusting;
+  judging.reckoned = prior_of(SE3{}, 5e-4, 2e-3);
+  EXPECT_GT(error_m(trusting, SE3{}), 5e-3);
+  EXPECT_LT(error_m(judging, SE3{}), 2e-3);
+  const PoseSolution all = optimiser_.solve(trusting, SE3{});
+  const PoseSolution agreed = optimiser_.solve(judging, SE3{});
+  EXPECT_LT(agreed.sight(5, 5), 0.1 * all.sight(5, 5));
+  EXPECT_GT(agreed.sight(3, 3), 0.9 * all.sight(3, 3)) << "walls still tell where they are";
 }
 
 }  // namespace

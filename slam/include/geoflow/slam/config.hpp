@@ -69,7 +69,7 @@ struct MappingConfig {
   int fixed = 10;          ///< further keyframes that see the same points or surfaces, held
   int map_neighbours = 4;  ///< keyframes that a new one's depth is registered to
   int iterations = 8;
-  double depth_sigma_at_1m = 0.003;  ///< of a feature's depth, growing with z^2 [m]
+  double inverse_depth_sigma = 0.003;  ///< of what a feature's depth measures [1/m]
 };
 // NOLINTEND(readability-magic-numbers)
 
