@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <pthread.h>
 #include <tl/expected.hpp>
@@ -16,6 +17,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
@@ -32,6 +34,7 @@
 
 #include "pipeline/estimation.hpp"
 #include "pipeline/propagation.hpp"
+#include "pipeline/pulse.hpp"
 #include "pipeline/sample_queues.hpp"
 #include "pipeline/started_ports.hpp"
 
@@ -40,7 +43,14 @@ namespace {
 
 using timesync::Doorbell;
 
-/// The doorbells of the three threads that wait.
+/// The signs of life of the three threads that wait.
+struct Pulses {
+  Pulse sync;
+  Pulse slam;
+  Pulse map;
+};
+
+/// Their doorbells.
 struct Bells {
   Doorbell sync;
   Doorbell slam;
@@ -103,6 +113,15 @@ class Pipeline::Implementation {
     run_.synchroniser = synchroniser_.counters();
   }
 
+  [[nodiscard]] std::vector<ThreadActivity> threads() const {
+    ThreadActivity source = run_.activity();
+    source.idle = source.idle || source_done_.load(std::memory_order_acquire);
+    ThreadActivity map = pulses_.map.activity("map", bells_.map);
+    map.long_work = true;
+    return {source, pulses_.sync.activity("sync", bells_.sync),
+            pulses_.slam.activity("slam", bells_.slam), map};
+  }
+
  private:
   /// Measures how long a sample's pose took.
   [[nodiscard]] PropagatedHandler measured(PropagatedHandler handler) const {
@@ -154,7 +173,7 @@ class Pipeline::Implementation {
         forward(std::move(*packet));
       }
       if (!done) {
-        wake = bells_.sync.wait(time_to_deadline(now));
+        wake = pulses_.sync.wait(bells_.sync, time_to_deadline(now));
       }
     }
     while (auto packet = done ? synchroniser_.flush() : std::nullopt) {
@@ -162,6 +181,7 @@ class Pipeline::Implementation {
     }
     packets_done_.store(done, std::memory_order_release);
     bells_.slam.ring();
+    pulses_.sync.end();
   }
 
   [[nodiscard]] std::optional<Duration> time_to_deadline(HostTime now) const {
@@ -185,15 +205,17 @@ class Pipeline::Implementation {
       if (const auto packet = packets_.try_pop()) {
         done = false;
         estimate(*packet);
+        pulses_.slam.turn();
         stopped = stop.stop_requested();
       } else if (!done) {
-        stopped = bells_.slam.wait() == Doorbell::Wake::kStopped;
+        stopped = pulses_.slam.wait(bells_.slam) == Doorbell::Wake::kStopped;
       }
     }
     if (!stopped) {
       finish_mapping();
       on_end_();
     }
+    pulses_.slam.end();
   }
 
   void estimate(const SyncedPacket& packet) {
@@ -222,7 +244,7 @@ class Pipeline::Implementation {
   /// At the source's end: what is still worked on goes into the final trajectory.
   void finish_mapping() {
     take_over_mapping();
-    while (mapping_ && bells_.slam.wait() != Doorbell::Wake::kStopped) {
+    while (mapping_ && pulses_.slam.wait(bells_.slam) != Doorbell::Wake::kStopped) {
       take_over_mapping();
     }
   }
@@ -236,9 +258,10 @@ class Pipeline::Implementation {
         // One task is out at a time, so there is room for its result.
         (void)results_.try_push(slam::optimise(*task, &run_.statistics->mapping));
         bells_.slam.ring();
+        pulses_.map.turn();
         stopped = stop.stop_requested();
       } else {
-        stopped = bells_.map.wait() == Doorbell::Wake::kStopped;
+        stopped = pulses_.map.wait(bells_.map) == Doorbell::Wake::kStopped;
       }
     }
   }
@@ -247,6 +270,7 @@ class Pipeline::Implementation {
   EstimateHandler on_estimate_;
   std::function<void()> on_end_;
   Bells bells_;
+  Pulses pulses_;
   SampleQueues queues_;
   timesync::Synchroniser synchroniser_;                 // sync
   Propagation propagation_;                             // sync
@@ -282,6 +306,10 @@ Result<std::unique_ptr<Pipeline>> Pipeline::start(Run& run, const Config& config
   }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
   return std::unique_ptr<Pipeline>{new Pipeline{std::move(implementation)}};
+}
+
+std::vector<ThreadActivity> Pipeline::threads() const {
+  return implementation_->threads();
 }
 
 void Pipeline::stop() {

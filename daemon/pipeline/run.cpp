@@ -1,5 +1,6 @@
 #include "geoflow/daemon/run.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/drivers/calibration_file.hpp"
 #include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/d435i.hpp"
@@ -43,13 +45,18 @@ drivers::RecordingOptions recording_options(const Config& config) {
           .color_as_gray = true};
 }
 
+tl::unexpected<Error> body_imu_without_place() {
+  return fail(
+      ErrorCode::kInvalidArgument,
+      "source.imu: the body's IMU is of no use where the calibration does not say where the "
+      "camera is on the robot (T_base_cam)");
+}
+
 /// Takes legs, IMU or both from a robot on DDS. The body's IMU stands elsewhere than the camera's.
 Result<void> open_robot(const Config& config, Run& run) {
   const bool with_imu = !config.source.imu.empty();
   if (with_imu && !run.calibration.T_base_cam) {
-    return fail(ErrorCode::kInvalidArgument,
-                "source.imu: the body's IMU is of no use where the calibration does not say where "
-                "the camera is on the robot (T_base_cam)");
+    return body_imu_without_place();
   }
   auto opened = drivers::DdsRobot::open(config.dds);
   if (!opened) {
@@ -70,10 +77,6 @@ Result<void> open_robot(const Config& config, Run& run) {
 }
 
 Result<void> open_recording(const Config& config, Run& run) {
-  if (config.source.replay.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "source: neither a recording (replay, --replay DIR) nor a camera is named");
-  }
   auto streams = drivers::RecordedStreams::open(recording_options(config));
   if (!streams) {
     return tl::unexpected{std::move(streams.error())};
@@ -125,15 +128,6 @@ Result<void> overlay_calibration(const std::filesystem::path& directory, Calibra
 }
 
 Result<void> open_camera(const Config& config, Run& run) {
-  if (config.source.camera != "d435i") {
-    return fail(ErrorCode::kInvalidArgument, "source.camera: '{}' is no device; there is: d435i",
-                config.source.camera);
-  }
-  if (!config.source.replay.empty() || !config.source.realtime) {
-    return fail(ErrorCode::kInvalidArgument,
-                "source.camera: a device keeps its own pace: source.replay must be empty and "
-                "source.realtime true");
-  }
   const auto options = d435i_options(config.d435i);
   if (!options) {
     return tl::unexpected{options.error()};
@@ -156,19 +150,6 @@ constexpr std::string_view kDds = "dds";
 /// Makes the devices that source.legs and source.imu name stand in for the recording's.
 Result<void> open_devices(const Config& config, Run& run) {
   const std::string& legs = config.source.legs;
-  const std::string& imu = config.source.imu;
-  if (!legs.empty() && legs != kCan && legs != kDds) {
-    return fail(ErrorCode::kInvalidArgument, "source.legs: '{}' is no device; there are: can, dds",
-                legs);
-  }
-  if (!imu.empty() && imu != kDds) {
-    return fail(ErrorCode::kInvalidArgument, "source.imu: '{}' is no device; there is: dds", imu);
-  }
-  if ((!legs.empty() || !imu.empty()) && !config.source.realtime) {
-    return fail(ErrorCode::kInvalidArgument,
-                "source.legs, source.imu: a device keeps its own pace, so source.realtime must be "
-                "true");
-  }
   if (legs == kCan) {
     auto can = drivers::open_can_legs(config.can);
     if (!can) {
@@ -176,7 +157,48 @@ Result<void> open_devices(const Config& config, Run& run) {
     }
     run.legs = std::move(*can);
   }
-  return legs == kDds || imu == kDds ? open_robot(config, run) : Result<void>{};
+  return legs == kDds || config.source.imu == kDds ? open_robot(config, run) : Result<void>{};
+}
+
+Result<void> check_camera(const Config& config) {
+  const SourceConfig& source = config.source;
+  if (source.camera != "d435i") {
+    return fail(ErrorCode::kInvalidArgument, "source.camera: '{}' is no device; there is: d435i",
+                source.camera);
+  }
+  if (!source.replay.empty() || !source.realtime) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.camera: a device keeps its own pace: source.replay must be empty and "
+                "source.realtime true");
+  }
+  if (auto options = d435i_options(config.d435i); !options) {
+    return tl::unexpected{std::move(options.error())};
+  }
+  Calibration calibration;
+  if (!source.calibration.empty()) {
+    auto overlaid = overlay_calibration(source.calibration, calibration);
+    if (!overlaid) {
+      return overlaid;
+    }
+  }
+  return source.imu.empty() || calibration.T_base_cam ? Result<void>{} : body_imu_without_place();
+}
+
+Result<void> check_devices(const SourceConfig& source) {
+  if (!source.legs.empty() && source.legs != kCan && source.legs != kDds) {
+    return fail(ErrorCode::kInvalidArgument, "source.legs: '{}' is no device; there are: can, dds",
+                source.legs);
+  }
+  if (!source.imu.empty() && source.imu != kDds) {
+    return fail(ErrorCode::kInvalidArgument, "source.imu: '{}' is no device; there is: dds",
+                source.imu);
+  }
+  if ((!source.legs.empty() || !source.imu.empty()) && !source.realtime) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.legs, source.imu: a device keeps its own pace, so source.realtime must be "
+                "true");
+  }
+  return {};
 }
 
 /// Every frame allocates and frees the same image-sized blocks. By default glibc gives such blocks
@@ -223,11 +245,35 @@ Result<void> Run::play(const std::stop_token& stop) {
   return {};
 }
 
+ThreadActivity Run::activity() const {
+  constexpr std::string_view kName = "replay";
+  if (camera) {
+    return {.name = kName, .turns = camera->status().turns};
+  }
+  const auto reached_ns = streams->now().time_since_epoch().count();
+  const auto until = streams->waits_until();
+  return {.name = kName,
+          .turns = static_cast<std::uint64_t>(reached_ns),
+          .idle = until && HostClock::now() < *until};
+}
+
 HostTime Run::to_recording_time(HostTime t) const {
   return streams ? streams->to_recording_time(t) : t;
 }
 
+Result<void> check_source(const Config& config) {
+  if (config.source.camera.empty() && config.source.replay.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source: neither a recording (replay, --replay DIR) nor a camera is named");
+  }
+  auto devices = check_devices(config.source);
+  return devices && !config.source.camera.empty() ? check_camera(config) : std::move(devices);
+}
+
 Result<Run> open_run(const Config& config) {
+  if (auto checked = check_source(config); !checked) {
+    return tl::unexpected{std::move(checked.error())};
+  }
   keep_freed_memory();
   Run run;
   auto opened =

@@ -34,17 +34,17 @@ nlohmann::json sensors(std::uint32_t bits) {
   return names;
 }
 
-std::string status_name(std::uint8_t status) {
-  return status <= GEOFLOW_LOST ? to_string(static_cast<TrackingStatus>(status))
-                                : std::to_string(status);
-}
-
 std::string source_name(std::uint8_t source) {
   const auto last = static_cast<std::uint8_t>(PoseSource::kConstantVelocity);
   return source <= last ? to_string(static_cast<PoseSource>(source)) : std::to_string(source);
 }
 
 }  // namespace
+
+std::string status_name(std::uint8_t status) {
+  return status <= GEOFLOW_LOST ? to_string(static_cast<TrackingStatus>(status))
+                                : std::to_string(status);
+}
 
 nlohmann::json pose_to_json(const geoflow_pose& pose) {
   return {{"t_capture_ns", pose.t_capture_ns},

@@ -38,15 +38,10 @@ Connection describe(UniqueFd fd) {
 
 }  // namespace
 
-Result<std::unique_ptr<Acceptor>> Acceptor::create(EventLoop& loop,
-                                                   const ListeningSocket::Options& options,
+Result<std::unique_ptr<Acceptor>> Acceptor::create(EventLoop& loop, ListeningSocket socket,
                                                    Handler handler) {
-  auto socket = ListeningSocket::open(options);
-  if (!socket) {
-    return tl::unexpected{std::move(socket.error())};
-  }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
-  std::unique_ptr<Acceptor> acceptor{new Acceptor{loop, std::move(*socket), std::move(handler)}};
+  std::unique_ptr<Acceptor> acceptor{new Acceptor{loop, std::move(socket), std::move(handler)}};
   auto added = loop.add(acceptor->socket_.fd(), EPOLLIN,
                         [self = acceptor.get()](std::uint32_t /*events*/) { self->accept_some(); });
   if (!added) {

@@ -27,8 +27,9 @@ class Acceptor {
  public:
   using Handler = std::function<void(Connection)>;
 
-  [[nodiscard]] static Result<std::unique_ptr<Acceptor>> create(
-      EventLoop& loop, const ListeningSocket::Options& options, Handler handler);
+  [[nodiscard]] static Result<std::unique_ptr<Acceptor>> create(EventLoop& loop,
+                                                                ListeningSocket socket,
+                                                                Handler handler);
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
   ~Acceptor();

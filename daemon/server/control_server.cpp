@@ -18,10 +18,12 @@
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
 #include "server/control_connection.hpp"
 #include "server/event_loop.hpp"
+#include "server/listening_socket.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -45,12 +47,18 @@ ControlServer::~ControlServer() {
 }
 
 Result<std::unique_ptr<ControlServer>> ControlServer::create(
-    EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status) {
+    EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status,
+    UniqueFd given) {
+  auto socket = ListeningSocket::open_unless_given(
+      {.path = config.control, .type = SOCK_STREAM, .mode = config.mode, .group = config.group},
+      std::move(given));
+  if (!socket) {
+    return tl::unexpected{std::move(socket.error())};
+  }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
   std::unique_ptr<ControlServer> server{new ControlServer{loop, config, std::move(status)}};
   auto acceptor = Acceptor::create(
-      loop,
-      {.path = config.control, .type = SOCK_STREAM, .mode = config.mode, .group = config.group},
+      loop, std::move(*socket),
       [self = server.get()](Connection connection) { self->on_connection(std::move(connection)); });
   if (!acceptor) {
     return tl::unexpected{std::move(acceptor.error())};

@@ -8,6 +8,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/hal/result.hpp"
+#include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
 #include "server/control_connection.hpp"
@@ -19,9 +20,11 @@ namespace geoflow::daemon {
 /// loop's.
 class ControlServer {
  public:
-  /// Errors as ListeningSocket::open().
+  /// A listening socket that is `given` stands in for the configured one. Errors as
+  /// ListeningSocket::open().
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> create(
-      EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status);
+      EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status,
+      UniqueFd given = {});
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
   ~ControlServer();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -56,14 +57,38 @@ Result<UniqueFd> take_lock(const std::filesystem::path& path) {
   return lock;
 }
 
+/// The process that listens at the path, if anybody does. Connecting without waiting: a backlog
+/// that is full is a listener's as well.
+std::optional<pid_t> find_listener(const sockaddr_un& address) {
+  for (const int type : {SOCK_SEQPACKET, SOCK_STREAM}) {
+    const UniqueFd probe{::socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
+    const void* generic = &address;
+    if (probe &&
+        ::connect(probe.get(), static_cast<const sockaddr*>(generic), sizeof address) == 0) {
+      ucred listener{};
+      socklen_t size = sizeof listener;
+      ::getsockopt(probe.get(), SOL_SOCKET, SO_PEERCRED, &listener, &size);
+      return listener.pid;
+    }
+    if (probe && errno == EAGAIN) {
+      return pid_t{0};
+    }
+  }
+  return std::nullopt;
+}
+
 /// Removes the socket that a daemon left behind; the lock is held.
-Result<void> remove_stale(const std::filesystem::path& path) {
+Result<void> remove_stale(const std::filesystem::path& path, const sockaddr_un& address) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) {
     return errno == ENOENT ? Result<void>{} : fail_errno(path.string());
   }
   if (!S_ISSOCK(status.st_mode)) {
     return fail(ErrorCode::kInvalidArgument, "{}: exists and is not a socket", path.string());
+  }
+  if (const auto pid = find_listener(address)) {
+    return fail(ErrorCode::kUnavailable, "{}: another process ({}) listens at this socket",
+                path.string(), *pid);
   }
   return ::unlink(path.c_str()) == 0 ? Result<void>{} : fail_errno(path.string());
 }
@@ -125,7 +150,7 @@ Result<ListeningSocket> ListeningSocket::open(const Options& options) {
   if (!lock) {
     return tl::unexpected{std::move(lock.error())};
   }
-  auto removed = remove_stale(options.path);
+  auto removed = remove_stale(options.path, *address);
   if (!removed) {
     return tl::unexpected{std::move(removed.error())};
   }
@@ -136,8 +161,12 @@ Result<ListeningSocket> ListeningSocket::open(const Options& options) {
   return ListeningSocket{options.path, std::move(*lock), std::move(*socket)};
 }
 
+Result<ListeningSocket> ListeningSocket::open_unless_given(const Options& options, UniqueFd given) {
+  return given ? ListeningSocket{{}, {}, std::move(given)} : open(options);
+}
+
 ListeningSocket::~ListeningSocket() {
-  if (socket_) {
+  if (socket_ && !path_.empty()) {
     ::unlink(path_.c_str());  // before the lock goes, so never another daemon's
   }
 }

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
@@ -10,8 +11,9 @@ namespace geoflow::daemon {
 
 /// A listening AF_UNIX socket with its file. The file's lock (`<path>.lock`, held as long as the
 /// object lives, with the holder's pid inside) decides who owns the path, so a socket file left by
-/// a daemon that was killed is replaced and a running daemon's never is. The socket file is removed
-/// at destruction. Thread-compatible.
+/// a daemon that was killed is replaced and a running daemon's never is; nor is one that anybody
+/// listens at without such a lock, as a service manager does. The socket file is removed at
+/// destruction. Thread-compatible.
 class ListeningSocket {
  public:
   struct Options {
@@ -25,6 +27,10 @@ class ListeningSocket {
   /// a path that is too long, is something else than a socket, or for an unknown group; kNotFound,
   /// kSystem for the rest.
   [[nodiscard]] static Result<ListeningSocket> open(const Options& options);
+  /// The same, unless somebody else has made a listening socket and passed it on: then that one,
+  /// whose file is theirs and stays.
+  [[nodiscard]] static Result<ListeningSocket> open_unless_given(const Options& options,
+                                                                 UniqueFd given);
 
   ListeningSocket(ListeningSocket&&) noexcept = default;
   ListeningSocket& operator=(ListeningSocket&&) = delete;
@@ -38,7 +44,7 @@ class ListeningSocket {
   ListeningSocket(std::filesystem::path path, UniqueFd lock, UniqueFd socket)
       : path_{std::move(path)}, lock_{std::move(lock)}, socket_{std::move(socket)} {}
 
-  std::filesystem::path path_;
+  std::filesystem::path path_;  // to be removed; empty: not ours
   UniqueFd lock_;
   UniqueFd socket_;
 };

@@ -26,9 +26,11 @@
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
 #include "server/event_loop.hpp"
+#include "server/listening_socket.hpp"
 #include "server/pose_connection.hpp"
 
 namespace geoflow::daemon {
@@ -77,12 +79,17 @@ PoseServer::~PoseServer() {
 }
 
 Result<std::unique_ptr<PoseServer>> PoseServer::create(EventLoop& loop, const SocketConfig& config,
-                                                       std::uint32_t clock_flags) {
+                                                       std::uint32_t clock_flags, UniqueFd given) {
+  auto socket = ListeningSocket::open_unless_given(
+      {.path = config.pose, .type = SOCK_SEQPACKET, .mode = config.mode, .group = config.group},
+      std::move(given));
+  if (!socket) {
+    return tl::unexpected{std::move(socket.error())};
+  }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
   std::unique_ptr<PoseServer> server{new PoseServer{loop, config, clock_flags}};
   auto acceptor = Acceptor::create(
-      loop,
-      {.path = config.pose, .type = SOCK_SEQPACKET, .mode = config.mode, .group = config.group},
+      loop, std::move(*socket),
       [self = server.get()](Connection connection) { self->on_connection(std::move(connection)); });
   if (!acceptor) {
     return tl::unexpected{std::move(acceptor.error())};

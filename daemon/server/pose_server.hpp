@@ -12,6 +12,7 @@
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+#include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
 #include "server/event_loop.hpp"
@@ -24,11 +25,12 @@ namespace geoflow::daemon {
 /// cut off. Thread-bound: the loop's.
 class PoseServer {
  public:
-  /// Errors as ListeningSocket::open(). `clock_flags` (geoflow_clock_flags) are told to clients in
-  /// WELCOME.
+  /// `clock_flags` (geoflow_clock_flags) are told to clients in WELCOME. A listening socket that is
+  /// `given` stands in for the configured one. Errors as ListeningSocket::open().
   [[nodiscard]] static Result<std::unique_ptr<PoseServer>> create(EventLoop& loop,
                                                                   const SocketConfig& config,
-                                                                  std::uint32_t clock_flags);
+                                                                  std::uint32_t clock_flags,
+                                                                  UniqueFd given = {});
   PoseServer(const PoseServer&) = delete;
   PoseServer& operator=(const PoseServer&) = delete;
   ~PoseServer();

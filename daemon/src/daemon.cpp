@@ -26,6 +26,10 @@
 #include "server/control_server.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_server.hpp"
+#include "service/given_sockets.hpp"
+#include "service/notify.hpp"
+#include "service/reporter.hpp"
+#include "service/status_line.hpp"
 #include "src/signal_watch.hpp"
 #include "src/worker.hpp"
 
@@ -41,15 +45,21 @@ class Daemon {
   explicit Daemon(const Config& config, std::unique_ptr<EventLoop> loop, timesync::Doorbell bell)
       : config_{config}, loop_{std::move(loop)}, bell_{std::move(bell)} {}
 
-  Result<void> start() {
+  Result<void> start(service::GivenSockets given) {
     return watch_signals()
-        .and_then([this] { return open_sockets(); })
+        .and_then([&] { return open_sockets(std::move(given)); })
         .and_then([this] { return start_worker(); })
         .and_then([this] {
           return loop_->add(bell_.fd(), EPOLLIN, [this](std::uint32_t /*events*/) { on_bell(); });
         })
         .and_then(
-            [this] { return loop_->add_timer(kHousekeepingPeriod, [this] { keep_house(); }); });
+            [this] { return loop_->add_timer(kHousekeepingPeriod, [this] { keep_house(); }); })
+        .map([this] {
+          // A device may come at any time; that a recording is there, is part of being ready.
+          if (!config_.source.camera.empty()) {
+            reporter_.ready();
+          }
+        });
   }
 
   Result<void> run() { return loop_->run(); }
@@ -61,16 +71,18 @@ class Daemon {
     return std::move(watch).map([this](auto made) { signals_ = std::move(made); });
   }
 
-  Result<void> open_sockets() {
-    if (!config_.socket.pose.empty()) {
-      auto server = PoseServer::create(*loop_, config_.socket, Worker::clock_flags(config_.source));
+  Result<void> open_sockets(service::GivenSockets given) {
+    if (given.pose || !config_.socket.pose.empty()) {
+      auto server = PoseServer::create(*loop_, config_.socket, Worker::clock_flags(config_.source),
+                                       std::move(given.pose));
       if (!server) {
         return tl::unexpected{std::move(server.error())};
       }
       poses_ = std::move(*server);
     }
-    if (!config_.socket.control.empty()) {
-      auto server = ControlServer::create(*loop_, config_.socket, [this] { return status(); });
+    if (given.control || !config_.socket.control.empty()) {
+      auto server = ControlServer::create(
+          *loop_, config_.socket, [this] { return status(); }, std::move(given.control));
       if (!server) {
         return tl::unexpected{std::move(server.error())};
       }
@@ -86,6 +98,9 @@ class Daemon {
 
   void on_bell() {
     bell_.clear();
+    if (!leaving_) {
+      take_source();
+    }
     const bool ended = worker_->ended();  // before the pose is taken, which then is the last
     if (const auto pose = worker_->take_pose()) {
       resets_ = pose->reset_counter;
@@ -99,7 +114,18 @@ class Daemon {
     }
   }
 
+  /// Starts the run when its source is open.
+  void take_source() {
+    auto proceeded = worker_->proceed();
+    if (!proceeded) {
+      end_with(std::move(proceeded.error()));
+    } else if (worker_->is_open()) {
+      reporter_.ready();
+    }
+  }
+
   void publish(const geoflow_pose& pose) {
+    newest_ = pose;
     if (poses_) {
       poses_->publish(pose);
     }
@@ -110,10 +136,11 @@ class Daemon {
 
   void on_signal(int signal) {
     if (signal == SIGHUP) {
-      log::info("daemon", "SIGHUP: the configuration is read at start only");
+      log::info("daemon", "SIGHUP: nothing to reload: the configuration is read at start only");
       return;
     }
     log::info("daemon", "stopping on signal {}", signal);
+    reporter_.stopping("stopping");
     worker_->stop();
     leave(GEOFLOW_END_STOPPED);
   }
@@ -123,9 +150,13 @@ class Daemon {
     worker_.reset();
     auto started = start_worker();
     if (!started) {
-      failure_ = std::move(started.error());
-      loop_->stop();
+      end_with(std::move(started.error()));
     }
+  }
+
+  void end_with(Error failure) {
+    failure_ = std::move(failure);
+    loop_->stop();
   }
 
   /// Says goodbye and ends once every client has heard it, or after kLastWords.
@@ -148,9 +179,27 @@ class Daemon {
     if (leaving_ && (heard || HostClock::now() - *leaving_ > kLastWords)) {
       loop_->stop();
     }
+    report();
   }
 
-  [[nodiscard]] nlohmann::json status() const {
+  /// Tells the service manager. Nothing more once it knows that this is the end.
+  void report() {
+    const HostTime now = HostClock::now();
+    if (leaving_ || !worker_) {
+      return;
+    }
+    reporter_.watch(worker_->threads(), now);
+    if (reporter_.is_due(now)) {
+      service::Observation seen{
+          .pose = newest_, .frames = worker_->frames(), .trouble = worker_->trouble()};
+      for (auto& [name, health] : worker_->sources()) {
+        seen.sources.push_back({.name = name == "imu" ? "IMU" : name, .health = std::move(health)});
+      }
+      reporter_.tell(seen, now);
+    }
+  }
+
+  [[nodiscard]] nlohmann::json status() {
     nlohmann::json status = worker_ ? worker_->status() : nlohmann::json::object();
     status["version"] = std::string{version()};
     status["pid"] = ::getpid();
@@ -175,6 +224,8 @@ class Daemon {
   std::unique_ptr<ControlServer> control_;
   std::uint32_t resets_ = 0;
   std::unique_ptr<Worker> worker_;
+  std::optional<geoflow_pose> newest_;
+  service::Reporter reporter_{service::watchdog_period()};
   std::optional<HostTime> leaving_;
   std::optional<Error> failure_;
 };
@@ -182,6 +233,10 @@ class Daemon {
 }  // namespace
 
 Result<ExitCode> run_daemon(const Config& config) {
+  auto given = service::take_given_sockets();
+  if (!given) {
+    return tl::unexpected{std::move(given.error())};
+  }
   auto loop = EventLoop::create();
   if (!loop) {
     return tl::unexpected{std::move(loop.error())};
@@ -191,7 +246,7 @@ Result<ExitCode> run_daemon(const Config& config) {
     return tl::unexpected{std::move(bell.error())};
   }
   Daemon daemon{config, std::move(*loop), std::move(*bell)};
-  auto done = daemon.start().and_then([&] { return daemon.run(); });
+  auto done = daemon.start(std::move(*given)).and_then([&] { return daemon.run(); });
   if (!done) {
     return tl::unexpected{std::move(done.error())};
   }

@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <pthread.h>
@@ -20,6 +21,7 @@
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/drivers/d435i.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/ports.hpp"
@@ -30,6 +32,8 @@
 #include "geoflow/slam/core.hpp"
 #include "geoflow/slam/saved_map.hpp"
 #include "geoflow/timesync/doorbell.hpp"
+
+#include "src/opener.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -82,26 +86,40 @@ nlohmann::json to_json(const drivers::D435iStatus& camera) {
 
 }  // namespace
 
-Worker::Worker(const Config& config, timesync::Doorbell& bell, std::uint32_t earlier_resets,
-               Run run)
-    : config_{config}, bell_{bell}, earlier_resets_{earlier_resets}, run_{std::move(run)} {}
+Worker::Worker(const Config& config, timesync::Doorbell& bell, timesync::Doorbell stop_opening,
+               std::uint32_t earlier_resets)
+    : config_{config},
+      bell_{bell},
+      earlier_resets_{earlier_resets},
+      opener_{config, bell, std::move(stop_opening)} {}
 
 Result<std::unique_ptr<Worker>> Worker::start(const Config& config, timesync::Doorbell& bell,
                                               std::uint32_t earlier_resets) {
-  auto run = open_run(config);
-  if (!run) {
-    return tl::unexpected{std::move(run.error())};
+  if (auto checked = check_source(config); !checked) {
+    return tl::unexpected{std::move(checked.error())};
   }
-  if (const std::optional<Error>& refused = run->map_refused) {
-    log::warning("map", "begins without a saved map: {}", refused->message);
+  auto stop_opening = timesync::Doorbell::create();
+  if (!stop_opening) {
+    return tl::unexpected{std::move(stop_opening.error())};
   }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
-  std::unique_ptr<Worker> worker{new Worker{config, bell, earlier_resets, std::move(*run)}};
-  auto launched = worker->launch();
-  if (!launched) {
-    return tl::unexpected{std::move(launched.error())};
+  return std::unique_ptr<Worker>{
+      new Worker{config, bell, std::move(*stop_opening), earlier_resets}};
+}
+
+Result<void> Worker::proceed() {
+  auto opened = opener_.take();
+  if (!opened) {
+    return {};
   }
-  return worker;
+  if (!*opened) {
+    return tl::unexpected{std::move(opened->error())};
+  }
+  run_.emplace(std::move(**opened));
+  if (const std::optional<Error>& refused = run_->map_refused) {
+    log::warning("map", "begins without a saved map: {}", refused->message);
+  }
+  return launch();
 }
 
 Result<void> Worker::launch() {
@@ -115,7 +133,7 @@ Result<void> Worker::launch() {
   };
   if (config_.source.realtime) {
     auto pipeline = Pipeline::start(
-        run_, config_,
+        *run_, config_,
         {.on_estimate = on_estimate, .on_end = [this] { end(); }, .on_propagated = on_propagated});
     if (!pipeline) {
       return tl::unexpected{std::move(pipeline.error())};
@@ -125,7 +143,7 @@ Result<void> Worker::launch() {
   }
   lock_step_ = std::jthread{[this, on_estimate, on_propagated](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "slam");
-    const auto done = LockStepRunner{run_, config_, on_estimate, on_propagated}.run(stop);
+    const auto done = LockStepRunner{*run_, config_, on_estimate, on_propagated}.run(stop);
     if (!done) {
       log::error("replay", "{}", done.error().message);
     }
@@ -142,9 +160,9 @@ void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
 }
 
 PoseContext Worker::context(HostTime t) const {
-  const RunCounters& counters = run_.statistics->counters;
+  const RunCounters& counters = run_->statistics->counters;
   return {.t_publish = HostClock::now(),
-          .t_recording = run_.to_recording_time(t),
+          .t_recording = run_->to_recording_time(t),
           .clock_flags = clock_flags(config_.source),
           .earlier_resets = earlier_resets_,
           .frames_dropped = counters.color_dropped.load(std::memory_order_relaxed) +
@@ -170,33 +188,66 @@ void Worker::stop() {
 void Worker::save_map() {
   const std::filesystem::path& file = config_.map.file;
   // What was refused may be somebody's; only where nothing was, a new map may be.
-  if (file.empty() || (run_.map_refused && run_.map_refused->code != ErrorCode::kNotFound)) {
+  if (file.empty() || !run_ ||
+      (run_->map_refused && run_->map_refused->code != ErrorCode::kNotFound)) {
     return;
   }
-  const auto saved = slam::save_map(*run_.core->snapshot(), file);
+  const auto saved = slam::save_map(*run_->core->snapshot(), file);
   if (!saved) {
     log::error("map", "not saved: {}", saved.error().message);
   }
 }
 
-nlohmann::json Worker::status() const {
-  nlohmann::json status = to_json(*run_.statistics);
-  status["source"] = {{"path", config_.source.replay.string()},
-                      {"format", run_.camera ? config_.source.camera : run_.streams->info().format},
-                      {"calibration", run_.calibration.source},
-                      {"realtime", config_.source.realtime}};
-  if (run_.camera) {
-    status["health"]["camera"] = to_json(run_.camera->camera().health());
-    status["health"]["imu"] = to_json(run_.camera->imu().health());
-    status["d435i"] = to_json(run_.camera->status());
+nlohmann::json Worker::status() {
+  nlohmann::json status = run_ ? to_json(*run_->statistics) : to_json(RunStatistics{});
+  nlohmann::json& source = status["source"];
+  source = {{"path", config_.source.replay.string()},
+            {"format", config_.source.camera},
+            {"open", is_open()},
+            {"trouble", trouble()},
+            {"realtime", config_.source.realtime}};
+  if (!run_) {
+    return status;
   }
-  if (run_.legs) {
-    status["health"]["legs"] = to_json(run_.legs->health());
+  source["calibration"] = run_->calibration.source;
+  if (run_->camera) {
+    status["d435i"] = to_json(run_->camera->status());
+  } else {
+    source["format"] = run_->streams->info().format;
   }
-  if (run_.imu) {
-    status["health"]["imu"] = to_json(run_.imu->health());
+  for (const auto& [name, health] : sources()) {
+    status["health"][name] = to_json(health);
   }
   return status;
+}
+
+std::vector<ThreadActivity> Worker::threads() const {
+  if (pipeline_) {
+    return pipeline_->threads();
+  }
+  if (lock_step_.joinable()) {
+    return {{.name = "slam", .turns = run_->activity().turns + frames(), .idle = ended()}};
+  }
+  return {opener_.activity()};
+}
+
+std::vector<SourceReport> Worker::sources() {
+  std::vector<SourceReport> reports;
+  if (run_) {
+    const Ports ports = run_->ports();
+    reports.push_back({.name = "camera", .health = ports.camera.health()});
+    if (ports.imu != nullptr) {
+      reports.push_back({.name = "imu", .health = ports.imu->health()});
+    }
+    if (ports.legs != nullptr) {
+      reports.push_back({.name = "legs", .health = ports.legs->health()});
+    }
+  }
+  return reports;
+}
+
+std::uint64_t Worker::frames() const noexcept {
+  return run_ ? run_->statistics->frames() : 0;
 }
 
 std::uint32_t Worker::clock_flags(const SourceConfig& source) noexcept {

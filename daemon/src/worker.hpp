@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -13,6 +15,8 @@
 #include "geoflow/daemon/pipeline.hpp"
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
+#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -20,21 +24,38 @@
 #include "geoflow/timesync/doorbell.hpp"
 #include "geoflow/timesync/latest.hpp"
 
+#include "src/opener.hpp"
+
 namespace geoflow::daemon {
 
-/// One run of the configured source in the background: the live pipeline, or lock step on one
-/// thread. It rings the bell when there is a new pose and when it has ended. All calls from the
+/// How one of the run's sources is.
+struct SourceReport {
+  std::string name;  ///< camera, imu or legs
+  SourceHealth health;
+};
+
+/// One run of the configured source in the background: first it is opened, which for a camera may
+/// take until it is there; then the live pipeline, or lock step on one thread. It rings the bell
+/// when the source is open, when there is a new pose and when it has ended. All calls from the
 /// thread that started it.
 class Worker {
  public:
-  /// `earlier_resets`: what the pose's reset_counter starts from. `config` and `bell` must outlive
-  /// it.
+  /// Begins to open the source. `earlier_resets`: what the pose's reset_counter starts from.
+  /// `config` and `bell` must outlive it. Errors: those of check_source().
   [[nodiscard]] static Result<std::unique_ptr<Worker>> start(const Config& config,
                                                              timesync::Doorbell& bell,
                                                              std::uint32_t earlier_resets);
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
   ~Worker() { stop(); }
+
+  /// Takes the source over as soon as it is open; to be called when the bell rings. Errors: of a
+  /// recording that cannot be opened, and of the threads' start.
+  [[nodiscard]] Result<void> proceed();
+  /// The source is open: poses can be expected.
+  [[nodiscard]] bool is_open() const noexcept { return run_.has_value(); }
+  /// Why the source is not open yet: a sentence, or empty.
+  [[nodiscard]] const std::string& trouble() { return opener_.trouble(); }
 
   /// The newest pose, once.
   [[nodiscard]] std::optional<geoflow_pose> take_pose() { return newest_.take_new(); }
@@ -46,13 +67,20 @@ class Worker {
   void stop();
 
   /// For the status reply.
-  [[nodiscard]] nlohmann::json status() const;
+  [[nodiscard]] nlohmann::json status();
+  /// What its threads show of themselves.
+  [[nodiscard]] std::vector<ThreadActivity> threads() const;
+  /// How the sources are; empty until the source is open.
+  [[nodiscard]] std::vector<SourceReport> sources();
+  /// Frames with an estimate so far.
+  [[nodiscard]] std::uint64_t frames() const noexcept;
 
   /// The clock flags of a configured source (geoflow_clock_flags).
   [[nodiscard]] static std::uint32_t clock_flags(const SourceConfig& source) noexcept;
 
  private:
-  Worker(const Config& config, timesync::Doorbell& bell, std::uint32_t earlier_resets, Run run);
+  Worker(const Config& config, timesync::Doorbell& bell, timesync::Doorbell stop_opening,
+         std::uint32_t earlier_resets);
   [[nodiscard]] Result<void> launch();
   void publish(const SyncedPacket& packet, const PoseEstimate& estimate);
   [[nodiscard]] PoseContext context(HostTime t) const;
@@ -62,13 +90,14 @@ class Worker {
   const Config& config_;
   timesync::Doorbell& bell_;
   std::uint32_t earlier_resets_;
-  Run run_;
+  std::optional<Run> run_;                     // none until the source is open
   timesync::Latest<geoflow_pose> newest_;      // from the estimating thread to the loop's
   timesync::Latest<geoflow_pose> propagated_;  // from the synchronising thread to the loop's
   std::atomic<bool> ended_{false};
   std::unique_ptr<Pipeline> pipeline_;
   std::jthread lock_step_;
   bool map_saved_ = false;
+  Opener opener_;
 };
 
 }  // namespace geoflow::daemon

@@ -38,6 +38,7 @@ namespace {
 
 constexpr std::size_t kRecentErrors = 32;
 constexpr double kLongestWaitS = 1e8;
+constexpr HostTime kNotWaiting = HostTime::min();
 
 DecodeOptions decode_options(const Calibration& calibration, const RecordingOptions& options) {
   return {.width = calibration.camera.width,
@@ -134,6 +135,10 @@ class RecordedStreams::Implementation {
   [[nodiscard]] const FaultCounters& faults() const { return faults_; }
   [[nodiscard]] HostTime now() const { return now_; }
   [[nodiscard]] Duration shift() const { return shift_; }
+  [[nodiscard]] std::optional<HostTime> waits_until() const {
+    const HostTime t = waits_until_.load(std::memory_order_acquire);
+    return t == kNotWaiting ? std::nullopt : std::optional{t};
+  }
   [[nodiscard]] DecodeStatistics decode_statistics() const { return prefetcher_.statistics(); }
   [[nodiscard]] DepthCamera& camera() { return camera_; }
   [[nodiscard]] Imu* imu() { return info_.has(StreamId::kImu) ? &imu_ : nullptr; }
@@ -159,7 +164,9 @@ class RecordedStreams::Implementation {
   /// True when it is time, false when stopped before.
   [[nodiscard]] bool wait_until(HostTime t, const std::stop_token& stop) {
     std::unique_lock lock{mutex_};
+    waits_until_.store(t, std::memory_order_release);
     wake_.wait_until(lock, stop, t, [] { return false; });
+    waits_until_.store(kNotWaiting, std::memory_order_release);
     return !stop.stop_requested();
   }
 
@@ -206,6 +213,7 @@ class RecordedStreams::Implementation {
   std::optional<Prefetched> pending_;  // taken by a play() that was stopped before its time
   std::atomic<HostTime> now_;
   std::atomic<Duration> shift_ = Duration{};  // of play()
+  std::atomic<HostTime> waits_until_ = kNotWaiting;
   mutable std::mutex mutex_;  // guards recent_errors_; and for wake_, which only a stop wakes
   std::condition_variable_any wake_;
   std::deque<std::string> recent_errors_;
@@ -268,6 +276,9 @@ Result<void> RecordedStreams::play(const std::stop_token& stop, double speed) {
 }
 HostTime RecordedStreams::to_recording_time(HostTime t) const {
   return t - implementation_->shift();
+}
+std::optional<HostTime> RecordedStreams::waits_until() const {
+  return implementation_->waits_until();
 }
 DecodeStatistics RecordedStreams::decode_statistics() const {
   return implementation_->decode_statistics();

@@ -11,6 +11,8 @@
 #include <utility>
 
 #include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace geoflow::log {
 namespace {
@@ -28,11 +30,20 @@ Sink& custom_sink() {
   return sink;
 }
 
+/// Whether stderr still is the journal's stream that $JOURNAL_STREAM names (systemd.exec(5)): the
+/// variable is inherited by what is started from there with another stderr, such as a terminal.
+bool stderr_is_journal() {
+  const char* named =
+      std::getenv("JOURNAL_STREAM");  // NOLINT(concurrency-mt-unsafe): never set here
+  struct stat status{};
+  return named != nullptr && ::fstat(STDERR_FILENO, &status) == 0 &&
+         fmt::format("{}:{}", status.st_dev, status.st_ino) == named;
+}
+
 void write_stderr(Level level, std::string_view category, std::string_view message) {
   constexpr std::array<int, 4> kSyslogPriority = {3, 4, 6, 7};
   constexpr std::array<std::string_view, 4> kName = {"error", "warning", "info", "debug"};
-  static const bool journal =
-      std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe): never set here
+  static const bool journal = stderr_is_journal();
   const auto index = static_cast<std::size_t>(level);
   const std::string line =
       journal ? fmt::format("<{}>{}: {}\n", kSyslogPriority.at(index), category, message)

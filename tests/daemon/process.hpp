@@ -20,6 +20,8 @@ class Process {
   Process& operator=(const Process&) = delete;
   ~Process();
 
+  /// While it runs, and until wait() has returned its code.
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void send_signal(int signal) const;
   /// Its exit code (128 + n after signal n), or nothing after `timeout`.
   std::optional<int> wait(Duration timeout);

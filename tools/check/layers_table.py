@@ -51,7 +51,7 @@ LIBRARIES = (
     Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/src/command_line.cpp", "tools")),
     Library("nlohmann-json", r"nlohmann/", ("nlohmann_json::nlohmann_json",), ("daemon", "tools")),
     Library("cairo", r"cairo", ("PkgConfig::CAIRO",), ("tools/plot",)),
-    Library("systemd", r"systemd/", ("PkgConfig::SYSTEMD",), ("daemon",)),
+    Library("systemd", r"systemd/", ("PkgConfig::SYSTEMD",), ("daemon/service",)),
     Library("udev", r"libudev\.h", ("PkgConfig::UDEV",), ("drivers/usb",)),
     Library("libusb", r"libusb", ("PkgConfig::LIBUSB",), ("drivers/usb",)),
     Library("V4L2", r"linux/(videodev2|uvcvideo|media)\.h", (), ("drivers/v4l2",)),
@@ -95,6 +95,8 @@ THREAD_FILES = (
     "drivers/replay/prefetcher.hpp",
     "drivers/replay/recorded_streams.cpp",  # paced replay waits for the next stamp, interruptibly
     "daemon/pipeline/pipeline.cpp",  # makes the live pipeline's threads
+    "daemon/src/opener.cpp",  # makes the thread that waits for a camera
+    "daemon/src/opener.hpp",
     "daemon/src/signal_watch.cpp",  # blocks signals for all threads
     "daemon/src/worker.cpp",  # makes the thread of a lock-step run
     "daemon/src/worker.hpp",

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <stop_token>
@@ -108,7 +109,8 @@ class D435i::Implementation {
                        .hardware_resets = counters.hardware_resets,
                        .imu_restarts = counters.imu_restarts,
                        .losses = counters.losses,
-                       .opens = counters.opens};
+                       .opens = counters.opens,
+                       .turns = ++turns_};
     if (const auto* link = session_.link()) {
       status.transport = link->transport;
       status.place = link->place;
@@ -134,6 +136,7 @@ class D435i::Implementation {
   SampleMaker maker_;
   std::string serial_;
   Session session_;
+  std::uint64_t turns_ = 0;
   mutable std::mutex mutex_;          // status_
   std::condition_variable_any wake_;  // never notified: only a stop ends its waits
   D435iStatus status_;

@@ -2,9 +2,11 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/hal/result.hpp"
 
 namespace geoflow::daemon {
@@ -40,6 +42,9 @@ class Pipeline {
   /// Ends all threads, after the packet that is worked on, and joins them; then run.synchroniser is
   /// filled. Not from one of its own threads. Idempotent.
   void stop();
+
+  /// What its threads show of themselves. Any thread, until stop().
+  [[nodiscard]] std::vector<ThreadActivity> threads() const;
 
  private:
   class Implementation;

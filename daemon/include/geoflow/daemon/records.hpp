@@ -111,6 +111,9 @@ struct PoseContext {
 /// The same record with the same names as JSON; status and source by their names.
 [[nodiscard]] nlohmann::json pose_to_json(const geoflow_pose& pose);
 
+/// The name of a pose's status: `TRACKING`; its number where it has none.
+[[nodiscard]] std::string status_name(std::uint8_t status);
+
 /// CLOCK_REALTIME - CLOCK_MONOTONIC now.
 [[nodiscard]] Duration realtime_minus_monotonic() noexcept;
 

@@ -8,6 +8,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/drivers/d435i.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
@@ -54,13 +55,21 @@ struct Run {
   [[nodiscard]] Ports ports();
   /// Delivers at the source's pace, until a recording ends or it is stopped.
   [[nodiscard]] Result<void> play(const std::stop_token& stop);
+  /// What the thread in play() shows of itself; any thread.
+  [[nodiscard]] ThreadActivity activity() const;
   /// A time on the recording's own time line; of a device the same.
   [[nodiscard]] HostTime to_recording_time(HostTime t) const;
 };
 
+/// What can be known to be wrong with the configured source without any device: names, what does
+/// not go together, a calibration folder that a camera's is to be completed from. Errors name key
+/// or file; kInvalidArgument, or as of load_calibration().
+[[nodiscard]] Result<void> check_source(const Config& config);
+
 /// Opens the configured source and makes an estimator for its calibration, which begins with the
 /// configured map if that can be read and was made with this calibration; from then on the process
-/// keeps the memory it frees. Errors name file, line or key.
+/// keeps the memory it frees. Errors are those of check_source(), and of what cannot be opened;
+/// they name file, line or key.
 [[nodiscard]] Result<Run> open_run(const Config& config);
 
 }  // namespace geoflow::daemon

@@ -60,6 +60,8 @@ struct D435iStatus {
   std::uint64_t imu_restarts = 0;
   std::uint64_t losses = 0;  ///< times that the camera went away
   std::uint64_t opens = 0;
+  /// Turns of run(): several a second, whether or not the camera is there, but while it is reset.
+  std::uint64_t turns = 0;
 };
 
 /// A D435i behind the ports: colour, depth registered to it, and the IMU.

@@ -110,7 +110,7 @@ class RecordedStreams {
   [[nodiscard]] Result<bool> step();
 
   /// The arrival time of the last sample delivered: the clock of an unpaced replay. Before the
-  /// first: info().start.
+  /// first: info().start. Thread-safe.
   [[nodiscard]] HostTime now() const;
 
   /// Delivers what is left in step with HostClock, `speed` times as fast as it was recorded (> 0),
@@ -118,6 +118,9 @@ class RecordedStreams {
   /// one is now. Returns at the end or when stopped. Rejected samples are counted and kept in
   /// recent_errors().
   [[nodiscard]] Result<void> play(const std::stop_token& stop, double speed = 1.0);
+
+  /// The time of the next sample while play() waits for it, none while it works. Thread-safe.
+  [[nodiscard]] std::optional<HostTime> waits_until() const;
 
   /// Undoes the shift of play(): a time on the recording's own time line. Identity after step()
   /// alone. Thread-safe.

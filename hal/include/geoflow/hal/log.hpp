@@ -16,7 +16,7 @@ enum class Level { kError, kWarning, kInfo, kDebug };
 using Sink = std::function<void(Level, std::string_view category, std::string_view message)>;
 
 /// Replaces the sink; an empty one restores the default, which writes `<n>category: message` lines
-/// to stderr under systemd (the syslog priority that journald reads) and `level category: message`
+/// to stderr where that is the journal (n: a syslog priority) and `level category: message`
 /// elsewhere. Thread-safe.
 void set_sink(Sink sink);
 

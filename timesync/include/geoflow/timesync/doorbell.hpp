@@ -34,6 +34,9 @@ class Doorbell {
   void stop() noexcept;
   [[nodiscard]] bool stopped() const noexcept { return stopped_.load(std::memory_order_acquire); }
 
+  /// Any thread: rung, and the waiting thread has not answered yet.
+  [[nodiscard]] bool rung() const noexcept { return rung_.load(std::memory_order_acquire); }
+
   /// The waiting thread only: returns when rung since the last wait (or clear), stopped, or after
   /// `timeout` (none: no limit; rounded up to whole milliseconds).
   [[nodiscard]] Wake wait(std::optional<Duration> timeout = std::nullopt) noexcept;
