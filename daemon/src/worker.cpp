@@ -18,6 +18,7 @@
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/lock_step_runner.hpp"
 #include "geoflow/daemon/pipeline.hpp"
+#include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
@@ -115,7 +116,7 @@ Result<void> Worker::proceed() {
   if (!*opened) {
     return tl::unexpected{std::move(opened->error())};
   }
-  run_.emplace(std::move(**opened));
+  run_ = std::make_unique<Run>(std::move(**opened));
   if (const std::optional<Error>& refused = run_->map_refused) {
     log::warning("map", "begins without a saved map: {}", refused->message);
   }

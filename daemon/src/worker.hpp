@@ -53,7 +53,7 @@ class Worker {
   /// recording that cannot be opened, and of the threads' start.
   [[nodiscard]] Result<void> proceed();
   /// The source is open: poses can be expected.
-  [[nodiscard]] bool is_open() const noexcept { return run_.has_value(); }
+  [[nodiscard]] bool is_open() const noexcept { return run_ != nullptr; }
   /// Why the source is not open yet: a sentence, or empty.
   [[nodiscard]] const std::string& trouble() { return opener_.trouble(); }
 
@@ -90,7 +90,7 @@ class Worker {
   const Config& config_;
   timesync::Doorbell& bell_;
   std::uint32_t earlier_resets_;
-  std::optional<Run> run_;                     // none until the source is open
+  std::unique_ptr<Run> run_;                   // null until the source is open
   timesync::Latest<geoflow_pose> newest_;      // from the estimating thread to the loop's
   timesync::Latest<geoflow_pose> propagated_;  // from the synchronising thread to the loop's
   std::atomic<bool> ended_{false};

@@ -6,10 +6,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
-#include <thread>
-#include <utility>
-#include <variant>
+#include <system_error>
 #include <vector>
 
 #include <fcntl.h>
@@ -19,6 +18,7 @@
 #include <sys/ptrace.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/types.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -103,6 +103,9 @@ class GeoflowdService : public testing::Test {
   /// A listening socket as a service manager makes it, with a number that a shell can pass on.
   static UniqueFd listening(const std::filesystem::path& socket, int type) {
     const UniqueFd fd{::socket(AF_UNIX, type, 0)};
+    if (!fd) {
+      throw std::runtime_error{"no socket"};
+    }
     const sockaddr_un address = address_of(socket);
     const void* generic = &address;
     EXPECT_EQ(::bind(fd.get(), static_cast<const sockaddr*>(generic), sizeof address), 0);
@@ -203,14 +206,14 @@ pid_t stop_thread(pid_t process, const std::string& name) {
 class StuckThread : public GeoflowdService, public testing::WithParamInterface<const char*> {};
 
 TEST_P(StuckThread, StarvesTheWatchdogUntilItMovesAgain) {
-  Process process{daemon({"WATCHDOG_USEC=1000000"}, replay()), log("daemon")};
+  const Process process{daemon({"WATCHDOG_USEC=1000000"}, replay()), log("daemon")};
   ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
   ASSERT_TRUE(manager_.wait_for("WATCHDOG=1"));
   const pid_t thread = stop_thread(process.pid(), GetParam());
   if (thread == 0 && errno == EPERM) {
     GTEST_SKIP() << "ptrace is not allowed here";
   }
-  ASSERT_NE(thread, 0) << std::strerror(errno);
+  ASSERT_NE(thread, 0) << std::generic_category().message(errno);
   bool starved = false;
   for (int i = 0; i < 100 && !starved; ++i) {
     starved = manager_.is_silent_of("WATCHDOG=1", seconds{3});

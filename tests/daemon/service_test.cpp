@@ -44,11 +44,11 @@ HostTime at(Duration since_start) {
 class Variable {
  public:
   Variable(const char* name, const std::string& value) : name_{name} {
-    ::setenv(name, value.c_str(), 1);
+    ::setenv(name, value.c_str(), 1);  // NOLINT(concurrency-mt-unsafe): no other thread
   }
   Variable(const Variable&) = delete;
   Variable& operator=(const Variable&) = delete;
-  ~Variable() { ::unsetenv(name_); }
+  ~Variable() { ::unsetenv(name_); }  // NOLINT(concurrency-mt-unsafe): no other thread
 
  private:
   const char* name_;
