@@ -237,7 +237,7 @@ Ports Run::ports() {
           .legs = legs ? legs.get() : streams->legs()};
 }
 
-Result<void> Run::play(const std::stop_token& stop) {
+Result<void> Run::play(const std::stop_token& stop) const {
   if (!camera) {
     return streams->play(stop);
   }

@@ -189,8 +189,11 @@ void Worker::stop() {
 void Worker::save_map() {
   const std::filesystem::path& file = config_.map.file;
   // What was refused may be somebody's; only where nothing was, a new map may be.
-  if (file.empty() || !run_ ||
-      (run_->map_refused && run_->map_refused->code != ErrorCode::kNotFound)) {
+  if (file.empty() || !run_) {
+    return;
+  }
+  if (const std::optional<Error>& refused = run_->map_refused;
+      refused && refused->code != ErrorCode::kNotFound) {
     return;
   }
   const auto saved = slam::save_map(*run_->core->snapshot(), file);

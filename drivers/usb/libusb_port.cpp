@@ -367,7 +367,7 @@ Result<std::unique_ptr<Port>> open_device(std::uint16_t vendor, std::uint16_t pr
   for (Found& one : *found) {
     if (!one.handle) {
       return fail(ErrorCode::kSystem,
-                  "the USB device {:04x}:{:04x} at {} cannot be opened: {}; udev/99-geoflow.rules "
+                  "the USB device {:04x}:{:04x} at {} cannot be opened: {}; udev/60-geoflow.rules "
                   "gives access to it",
                   vendor, product, one.info.place, libusb_strerror(one.open_code));
     }

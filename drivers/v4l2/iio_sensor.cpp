@@ -45,7 +45,7 @@ Result<void> write_file(const fs::path& path, std::string_view text) {
     return fail(number == ENOENT || number == ENODEV ? ErrorCode::kNotFound : ErrorCode::kSystem,
                 "{}: cannot be written: {}{}", path.string(),
                 std::system_category().message(number),
-                number == EACCES ? "; udev/99-geoflow.rules gives access to it" : "");
+                number == EACCES ? "; udev/60-geoflow.rules gives access to it" : "");
   }
   return {};
 }

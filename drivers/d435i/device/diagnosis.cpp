@@ -26,7 +26,7 @@ constexpr std::uint16_t kRecoveryProduct = 0x0adb;
 constexpr int kSuperSpeed_mbps = 5000;
 constexpr std::size_t kImuSensors = 2;
 constexpr const char* kRules =
-    "copy udev/99-geoflow.rules to /etc/udev/rules.d, run `udevadm control --reload`, and plug the "
+    "copy udev/60-geoflow.rules to /etc/udev/rules.d, run `udevadm control --reload`, and plug the "
     "camera in again; the user must be in the group plugdev";
 
 SeenNode look_at(const v4l2::VideoNode& node) {

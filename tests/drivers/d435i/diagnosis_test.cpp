@@ -69,7 +69,7 @@ TEST(Diagnosis, NamesEachLackWithItsRemedy) {
   expect_one(camera, Grade::kProblem, "USB 3 cable");
   camera = healthy();
   camera.usb_accessible = false;
-  expect_one(camera, Grade::kProblem, "99-geoflow.rules");
+  expect_one(camera, Grade::kProblem, "60-geoflow.rules");
   camera = healthy();
   camera.nodes.clear();
   expect_one(camera, Grade::kProblem, "modprobe uvcvideo");
@@ -81,7 +81,7 @@ TEST(Diagnosis, NamesEachLackWithItsRemedy) {
   expect_one(camera, Grade::kProblem, "hid-sensor-hub");
   camera = healthy();
   camera.iio_writable = false;
-  expect_one(camera, Grade::kProblem, "99-geoflow.rules");
+  expect_one(camera, Grade::kProblem, "60-geoflow.rules");
 }
 
 TEST(Diagnosis, MetadataInPartIsANote) {

@@ -54,7 +54,7 @@ struct Run {
   /// The recording's ports, but for those that a device stands in for.
   [[nodiscard]] Ports ports();
   /// Delivers at the source's pace, until a recording ends or it is stopped.
-  [[nodiscard]] Result<void> play(const std::stop_token& stop);
+  [[nodiscard]] Result<void> play(const std::stop_token& stop) const;
   /// What the thread in play() shows of itself; any thread.
   [[nodiscard]] ThreadActivity activity() const;
   /// A time on the recording's own time line; of a device the same.
