@@ -220,6 +220,18 @@ Result<void> set_key(Config& config, std::string_view assignment) {
   return Reader{config, "--set", false}.read(*table, "");
 }
 
+Result<Config> configure(const std::filesystem::path& file,
+                         const std::vector<std::string>& settings) {
+  auto config = file.empty() ? Result<Config>{Config{}} : load_config(file);
+  for (const std::string& setting : settings) {
+    auto set = config ? set_key(*config, setting) : Result<void>{};
+    if (!set) {
+      return tl::unexpected{std::move(set.error())};
+    }
+  }
+  return config;
+}
+
 std::vector<ConfigValue> list_keys(const Config& config) {
   Config copy = config;
   std::vector<ConfigValue> values;

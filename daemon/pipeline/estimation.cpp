@@ -23,11 +23,11 @@ PoseEstimate process_packet(Run& run, const SyncedPacket& packet) {
 
 timesync::SynchroniserStreams synchroniser_streams(Run& run) {
   const Ports ports = run.ports();
-  timesync::SynchroniserStreams described{.camera = ports.camera.stamps(),
+  timesync::SynchroniserStreams described{.camera = ports.camera->stamps(),
                                           .timeshift_cam_imu = run.calibration.timeshift_cam_imu};
   if (ports.imu != nullptr) {
     described.imu = ports.imu->stamps();
-    described.imu_on_camera_clock = run.camera && !run.imu;
+    described.imu_on_camera_clock = described.imu->on_camera_clock;
   }
   if (ports.legs != nullptr) {
     described.legs = ports.legs->stamps();

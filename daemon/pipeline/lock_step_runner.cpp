@@ -7,6 +7,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/started_ports.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
@@ -19,7 +20,6 @@
 
 #include "pipeline/estimation.hpp"
 #include "pipeline/propagation.hpp"
-#include "pipeline/started_ports.hpp"
 
 namespace geoflow::daemon {
 namespace {

@@ -17,6 +17,7 @@
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/propagated_pose.hpp"
 #include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/started_ports.hpp"
 #include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
@@ -36,7 +37,6 @@
 #include "pipeline/propagation.hpp"
 #include "pipeline/pulse.hpp"
 #include "pipeline/sample_queues.hpp"
-#include "pipeline/started_ports.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -154,7 +154,7 @@ class Pipeline::Implementation {
     if (!played) {
       log::error("replay", "{}", played.error().message);
     }
-    run_.statistics->counters.rejected.store(run_.ports().camera.health().rejected);
+    run_.statistics->counters.rejected.store(run_.ports().camera->health().rejected);
     source_done_.store(!stop.stop_requested(), std::memory_order_release);
     bells_.sync.ring();
   }

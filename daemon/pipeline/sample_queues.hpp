@@ -5,6 +5,7 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/started_ports.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/doorbell.hpp"
@@ -13,7 +14,6 @@
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include "pipeline/propagation.hpp"
-#include "pipeline/started_ports.hpp"
 
 namespace geoflow::daemon {
 

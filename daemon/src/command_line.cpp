@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <string>
-#include <utility>
 #include <variant>
 
 #include <CLI/App.hpp>
@@ -10,7 +9,6 @@
 #include <CLI/Error.hpp>
 #include <CLI/Formatter.hpp>
 #include <fmt/core.h>
-#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/version.hpp"
@@ -91,18 +89,10 @@ std::variant<CommandLine, ExitCode> parse_command_line(int argc, const char* con
 }
 
 Result<Config> make_config(const CommandLine& command_line) {
-  auto config = command_line.config_file.empty() ? Result<Config>{Config{}}
-                                                 : load_config(command_line.config_file);
-  if (!config) {
-    return config;
+  auto config = configure(command_line.config_file, command_line.settings);
+  if (config) {
+    apply_options(command_line, *config);
   }
-  for (const std::string& setting : command_line.settings) {
-    auto set = set_key(*config, setting);
-    if (!set) {
-      return tl::unexpected{std::move(set.error())};
-    }
-  }
-  apply_options(command_line, *config);
   return config;
 }
 

@@ -214,10 +214,10 @@ nlohmann::json Worker::status() {
     return status;
   }
   source["calibration"] = run_->calibration.source;
-  if (run_->camera) {
-    status["d435i"] = to_json(run_->camera->status());
-  } else {
+  if (!run_->camera) {
     source["format"] = run_->streams->info().format;
+  } else if (const auto* d435i = dynamic_cast<const drivers::D435i*>(run_->camera.get())) {
+    status["d435i"] = to_json(d435i->status());
   }
   for (const auto& [name, health] : sources()) {
     status["health"][name] = to_json(health);
@@ -239,7 +239,7 @@ std::vector<SourceReport> Worker::sources() {
   std::vector<SourceReport> reports;
   if (run_) {
     const Ports ports = run_->ports();
-    reports.push_back({.name = "camera", .health = ports.camera.health()});
+    reports.push_back({.name = "camera", .health = ports.camera->health()});
     if (ports.imu != nullptr) {
       reports.push_back({.name = "imu", .health = ports.imu->health()});
     }

@@ -100,4 +100,6 @@ THREAD_FILES = (
     "daemon/src/signal_watch.cpp",  # blocks signals for all threads
     "daemon/src/worker.cpp",  # makes the thread of a lock-step run
     "daemon/src/worker.hpp",
+    "tools/record/live_recorder.cpp",  # the source delivers on a thread of its own while this one writes
+    "tools/record/sample_queue.hpp",  # between the threads that bring samples and the one that writes them
 )

@@ -97,14 +97,7 @@ class ReplayVerb final : public Verb {
 
  private:
   [[nodiscard]] Result<daemon::Config> make_config() const {
-    auto config = config_file_.empty() ? Result<daemon::Config>{daemon::Config{}}
-                                       : daemon::load_config(config_file_);
-    for (const std::string& setting : settings_) {
-      auto set = config ? daemon::set_key(*config, setting) : Result<void>{};
-      if (!set) {
-        return tl::unexpected{std::move(set.error())};
-      }
-    }
+    auto config = daemon::configure(config_file_, settings_);
     if (config) {
       config->source = {.replay = recording_,
                         .calibration = calibration_,

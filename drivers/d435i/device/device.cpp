@@ -152,11 +152,14 @@ const Calibration& D435i::calibration() const {
 DepthCamera& D435i::camera() {
   return implementation_->maker().camera();
 }
-Imu& D435i::imu() {
-  return implementation_->maker().imu();
+Imu* D435i::imu() {
+  return &implementation_->maker().imu();
 }
 void D435i::run(const std::stop_token& stop) {
   implementation_->run(stop);
+}
+std::uint64_t D435i::turns() const {
+  return status().turns;
 }
 D435iStatus D435i::status() const {
   return implementation_->status();

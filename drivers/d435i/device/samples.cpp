@@ -35,7 +35,8 @@ constexpr std::uint32_t kLargestOpticalTime_us = 200'000;
 // More frames than this between two counters is a counter that began anew.
 constexpr std::uint32_t kLargestGap = 1000;
 
-constexpr StampInfo kDeviceStamps{.domain = StampDomain::kDevice, .wrap = kClockWrap};
+constexpr StampInfo kImuStamps{
+    .domain = StampDomain::kDevice, .wrap = kClockWrap, .on_camera_clock = true};
 
 }  // namespace
 
@@ -47,7 +48,7 @@ SampleMaker::SampleMaker(DepthRegistration registration, const ImageShape& color
       imu_table_{imu},
       pool_{kPooledFrames},
       camera_{camera_stamps},
-      imu_{kDeviceStamps} {}
+      imu_{kImuStamps} {}
 
 std::uint64_t SampleMaker::stamped_by_arrival() const noexcept {
   std::uint64_t sum = 0;

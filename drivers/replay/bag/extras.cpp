@@ -40,6 +40,8 @@ constexpr std::array<std::pair<const char*, StampInfo RecordingStamps::*>, 3> kD
     {"geoflow.stamps.legs_device_wrap_ns", &RecordingStamps::legs},
 }};
 
+constexpr const char* kImuOnCameraClock = "geoflow.stamps.imu_on_camera_clock";
+
 template <typename Number>
 std::optional<Number> number(const CustomData& data, const char* key) {
   const auto found = data.find(key);
@@ -89,6 +91,7 @@ Extras parse_extras(const CustomData& custom_data) {
                                .wrap = *wrap > 0 ? std::optional{Duration{*wrap}} : std::nullopt};
     }
   }
+  extras.stamps.imu.on_camera_clock = number<int>(custom_data, kImuOnCameraClock) == 1;
   return extras;
 }
 
@@ -113,6 +116,9 @@ CustomData to_custom_data(const Extras& extras) {
     if (stamps.domain == StampDomain::kDevice) {
       data[key] = fmt::format("{}", stamps.wrap.value_or(Duration{}).count());
     }
+  }
+  if (extras.stamps.imu.on_camera_clock) {
+    data[kImuOnCameraClock] = fmt::format("{}", 1);
   }
   return data;
 }

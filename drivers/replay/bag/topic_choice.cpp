@@ -121,6 +121,10 @@ std::string beside(const std::string& image_topic) {
   return name.substr(0, name.rfind('/')) + "/camera_info";
 }
 
+bool has_other_samples(const TopicChoice& choice) {
+  return !choice.imu.empty() || !choice.legs.empty() || !choice.odometry.empty();
+}
+
 }  // namespace
 
 std::string describe_topics(const std::vector<BagTopic>& topics) {
@@ -153,6 +157,9 @@ Result<TopicChoice> choose_topics(const std::vector<BagTopic>& topics, const Top
           });
   if (!done) {
     return tl::unexpected{std::move(done).error()};
+  }
+  if (choice.color.empty() && choice.depth.empty() && has_other_samples(choice)) {
+    return choice;
   }
   if (choice.color.empty() || choice.depth.empty()) {
     const char* missing = !choice.color.empty()   ? "depth topic"

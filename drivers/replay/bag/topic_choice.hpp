@@ -25,8 +25,8 @@ struct TopicChoice {
 /// image_transport's `/compressed` or `/compressedDepth` behind it; the only topic of a fitting
 /// type that ends with the name (realsense-ros puts a namespace before it), for images also without
 /// the name's first part (another camera name). camera_info is looked for beside the colour topic
-/// first. A name that exists with another type, a name that fits several topics, and a bag without
-/// colour or depth are errors that list what the bag has.
+/// first. A name that exists with another type, a name that fits several topics, and a bag with one
+/// of colour and depth alone, or with none of all, are errors that list what the bag has.
 [[nodiscard]] Result<TopicChoice> choose_topics(const std::vector<BagTopic>& topics,
                                                 const TopicNames& names);
 

@@ -98,6 +98,9 @@ class FaultReader final : public RecordingReader {
                       : fault.touches(StreamId::kImu) ? stamps_.imu
                                                       : stamps_.legs;
     info.domain = StampDomain::kDevice;
+    if (&info != &stamps_.legs) {
+      stamps_.imu.on_camera_clock = false;  // the two no longer run alike
+    }
     if (fault.kind == FaultKind::kClockWrap) {
       info.wrap = kWrapPeriod;
     }

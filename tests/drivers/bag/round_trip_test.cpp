@@ -235,7 +235,8 @@ TEST(BagRoundTrip, CalibrationComesBack) {
   FramePool pool{2};
   BagWriterOptions options{.directory = path};
   options.imu_stamps = {.domain = StampDomain::kDevice,
-                        .wrap = std::chrono::microseconds{1LL << 32}};
+                        .wrap = std::chrono::microseconds{1LL << 32},
+                        .on_camera_clock = true};
   auto writer = BagWriter::create(options, calibration());
   ASSERT_TRUE(writer) << writer.error().message;
   const HostTime t{std::chrono::seconds{100}};
@@ -273,6 +274,7 @@ TEST(BagRoundTrip, CalibrationComesBack) {
   EXPECT_EQ(reader->stamps().camera.domain, StampDomain::kHost);
   EXPECT_EQ(reader->stamps().imu.domain, StampDomain::kDevice);
   EXPECT_EQ(reader->stamps().imu.wrap, Duration{4'294'967'296'000});
+  EXPECT_TRUE(reader->stamps().imu.on_camera_clock);
 }
 
 TEST(BagRoundTrip, ClosedBagIsOneDatabaseAndItsDescription) {

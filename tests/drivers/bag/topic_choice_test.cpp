@@ -100,6 +100,14 @@ TEST(TopicChoice, BagWithoutDepthIsAnErrorThatListsTheTopics) {
               HasSubstr("/camera/color/image_raw (sensor_msgs/msg/Image, 1 messages)"));
 }
 
+TEST(TopicChoice, BagMayHaveLegsAlone) {
+  const auto choice = bag::choose_topics({topic("/joint_foot", ros::JointState::kType)}, {});
+  ASSERT_TRUE(choice) << choice.error().message;
+  EXPECT_EQ(choice->legs, "/joint_foot");
+  EXPECT_EQ(choice->color, "");
+  EXPECT_EQ(choice->camera_info, "");
+}
+
 TEST(TopicChoice, EmptyNameIsNotWanted) {
   TopicNames names;
   names.imu = "";

@@ -99,7 +99,7 @@ TEST(D435iDevice, RunsUntilItIsStopped) {
   ASSERT_TRUE(device) << device.error().message;
   Received received;
   ASSERT_TRUE((*device)->camera().start(received));
-  ASSERT_TRUE((*device)->imu().start(received));
+  ASSERT_TRUE((*device)->imu()->start(received));
   {
     std::jthread runner{[&](const std::stop_token& stop) { (*device)->run(stop); }};
     const HostTime limit = HostClock::now() + std::chrono::seconds{20};

@@ -216,7 +216,7 @@ TEST_F(EmulatedD435i, TheWholeDeviceDeliversSamples) {
   const auto device = open_device({}, [&](const std::string& /*serial*/) { return open(); });
   ASSERT_TRUE(device);
   ASSERT_TRUE((*device)->camera().start(sink));
-  ASSERT_TRUE((*device)->imu().start(sink));
+  ASSERT_TRUE((*device)->imu()->start(sink));
   std::stop_source stop;
   // The model's time runs as it is polled: until all frames are there, or far beyond.
   const auto enough = [&] { return sink.depth.size() + sink.color.size() >= 2 * kFrames - 4; };

@@ -97,6 +97,11 @@ struct Config {
 /// above.
 [[nodiscard]] Result<void> set_key(Config& config, std::string_view assignment);
 
+/// load_config(), or the defaults where no file is named (an empty path), overlaid by `settings` in
+/// their order: a program's --config and --set options. Errors as above.
+[[nodiscard]] Result<Config> configure(const std::filesystem::path& file,
+                                       const std::vector<std::string>& settings);
+
 /// One key as it stands, value in TOML's notation.
 struct ConfigValue {
   std::string key;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "geoflow/drivers/live_camera.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
@@ -66,9 +67,8 @@ struct D435iStatus {
 
 /// A D435i behind the ports: colour, depth registered to it, and the IMU.
 ///
-/// Samples are delivered on the thread that calls run(). The ports' start, stop and health, and
-/// status(), may be called from other threads, but not from inside a sink.
-class D435i {
+/// status() may be called from other threads, but not from inside a sink.
+class D435i final : public LiveCamera {
  public:
   /// Finds the camera and reads its calibration. kNotFound where there is none, else an Error that
   /// says in words what is in the way. Waits for the firmware, a second at most.
@@ -76,15 +76,15 @@ class D435i {
 
   D435i(const D435i&) = delete;
   D435i& operator=(const D435i&) = delete;
-  ~D435i();
+  ~D435i() override;
 
-  [[nodiscard]] const Calibration& calibration() const;
-  [[nodiscard]] DepthCamera& camera();
-  [[nodiscard]] Imu& imu();
+  [[nodiscard]] const Calibration& calibration() const override;
+  [[nodiscard]] DepthCamera& camera() override;
+  [[nodiscard]] Imu* imu() override;
 
-  /// Streams until stopped, through every loss of the camera (docs/d435i.md, "Recovery"). Returns
-  /// within a tenth of a second of the stop.
-  void run(const std::stop_token& stop);
+  /// See docs/d435i.md, "Recovery".
+  void run(const std::stop_token& stop) override;
+  [[nodiscard]] std::uint64_t turns() const override;
 
   [[nodiscard]] D435iStatus status() const;
 

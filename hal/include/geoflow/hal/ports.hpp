@@ -27,6 +27,8 @@ struct StampInfo {
   StampDomain domain = StampDomain::kHost;
   /// The counter's period, where it wraps (2^32 us for UVC metadata); none where it does not.
   std::optional<Duration> wrap{};
+  /// Of an IMU: by the very clock that stamps the camera's images.
+  bool on_camera_clock = false;
 };
 
 enum class SourceState : std::uint8_t { kStopped, kStreaming, kDegraded, kFailed };

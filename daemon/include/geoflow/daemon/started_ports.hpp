@@ -1,6 +1,6 @@
 #pragma once
 
-#include "geoflow/daemon/run.hpp"
+#include "geoflow/daemon/sources.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 
@@ -19,7 +19,10 @@ class StartedPorts {
   /// outlive stop().
   template <typename Receiver>
   [[nodiscard]] Result<void> start(Receiver& receiver) {
-    auto started = ports_.camera.start(receiver);
+    Result<void> started;
+    if (ports_.camera != nullptr) {
+      started = ports_.camera->start(receiver);
+    }
     if (started && ports_.imu != nullptr) {
       started = ports_.imu->start(receiver);
     }
@@ -30,7 +33,9 @@ class StartedPorts {
   }
 
   void stop() {
-    ports_.camera.stop();
+    if (ports_.camera != nullptr) {
+      ports_.camera->stop();
+    }
     if (ports_.imu != nullptr) {
       ports_.imu->stop();
     }
