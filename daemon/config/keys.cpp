@@ -54,6 +54,13 @@ void bind_d435i(CameraConfig& c, std::vector<Key>& keys) {
   keys.push_back({"d435i.exposure_us", &c.exposure_us, 0, 165000});
 }
 
+void bind_openni2(OpenNi2Config& c, std::vector<Key>& keys) {
+  keys.push_back({"openni2.uri", &c.uri});
+  keys.push_back({"openni2.width", &c.width, 160, 1920});
+  keys.push_back({"openni2.height", &c.height, 120, 1200});
+  keys.push_back({"openni2.rate_hz", &c.rate_hz, 5, 120});
+}
+
 void bind_can(drivers::CanLegsOptions& c, std::vector<Key>& keys) {
   keys.push_back({"can.interfaces", &c.interfaces});
   keys.push_back({"can.dictionary", &c.dictionary});
@@ -174,6 +181,7 @@ std::vector<Key> bind_keys(Config& config) {
   bind_source(config.source, keys);
   bind_topics(config.topics, keys);
   bind_d435i(config.d435i, keys);
+  bind_openni2(config.openni2, keys);
   bind_can(config.can, keys);
   bind_dds(config.dds, keys);
   bind_synchroniser(config.synchroniser, keys);

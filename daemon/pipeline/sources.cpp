@@ -18,6 +18,7 @@
 #include "geoflow/drivers/d435i.hpp"
 #include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/live_camera.hpp"
+#include "geoflow/drivers/openni2_camera.hpp"
 #include "geoflow/drivers/recording.hpp"
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
@@ -111,11 +112,22 @@ Result<drivers::D435iOptions> d435i_options(const CameraConfig& config, PixelFor
   return options;
 }
 
-/// What a file says of the robot, on a camera that knows its own intrinsics.
-Result<void> overlay_calibration(const std::filesystem::path& directory, Calibration& calibration) {
+/// What a file says of the robot; and of the camera, where that does not know its own intrinsics
+/// well (`with_intrinsics`).
+Result<void> overlay_calibration(const std::filesystem::path& directory, bool with_intrinsics,
+                                 Calibration& calibration) {
   auto file = drivers::load_calibration(directory);
   if (!file) {
     return tl::unexpected{std::move(file.error())};
+  }
+  if (with_intrinsics) {
+    if (file->camera.width != calibration.camera.width ||
+        file->camera.height != calibration.camera.height) {
+      return fail(ErrorCode::kInvalidArgument, "{}: is of a camera of {}x{}; this one is {}x{}",
+                  file->source, file->camera.width, file->camera.height, calibration.camera.width,
+                  calibration.camera.height);
+    }
+    calibration.camera = file->camera;
   }
   calibration.T_base_cam = file->T_base_cam;
   if (file->T_cam_imu) {
@@ -127,19 +139,40 @@ Result<void> overlay_calibration(const std::filesystem::path& directory, Calibra
   return {};
 }
 
+Result<std::unique_ptr<drivers::LiveCamera>> open_d435i(const CameraConfig& config,
+                                                        PixelFormat color) {
+  return d435i_options(config, color)
+      .and_then([](const auto& options) { return drivers::D435i::open(options); })
+      .map([](auto camera) -> std::unique_ptr<drivers::LiveCamera> { return camera; });
+}
+
+Result<std::unique_ptr<drivers::LiveCamera>> open_openni2(const OpenNi2Config& config,
+                                                          PixelFormat color) {
+  return drivers::open_openni2_camera({.uri = config.uri,
+                                       .width = config.width,
+                                       .height = config.height,
+                                       .rate_hz = config.rate_hz,
+                                       .color_as_gray = color == PixelFormat::kGray8});
+}
+
+constexpr std::string_view kD435i = "d435i";
+constexpr std::string_view kOpenNi2 = "openni2";
+
 Result<void> open_camera(const Config& config, PixelFormat color, Sources& sources) {
-  auto camera = d435i_options(config.d435i, color).and_then([](const auto& options) {
-    return drivers::D435i::open(options);
-  });
+  auto camera = config.source.camera == kD435i ? open_d435i(config.d435i, color)
+                                               : open_openni2(config.openni2, color);
   if (!camera) {
     return tl::unexpected{std::move(camera.error())};
   }
   sources.camera = std::move(*camera);
   sources.calibration = sources.camera->calibration();
-  sources.calibration.imu_noise.rate_hz = config.d435i.gyro_hz;
+  if (sources.camera->imu() != nullptr) {
+    sources.calibration.imu_noise.rate_hz = config.d435i.gyro_hz;
+  }
   return config.source.calibration.empty()
              ? Result<void>{}
-             : overlay_calibration(config.source.calibration, sources.calibration);
+             : overlay_calibration(config.source.calibration,
+                                   config.source.camera == kOpenNi2, sources.calibration);
 }
 
 constexpr std::string_view kCan = "can";
@@ -160,9 +193,9 @@ Result<void> open_devices(const Config& config, Sources& sources) {
 
 Result<void> check_camera(const Config& config) {
   const SourceConfig& source = config.source;
-  if (source.camera != "d435i") {
-    return fail(ErrorCode::kInvalidArgument, "source.camera: '{}' is no device; there is: d435i",
-                source.camera);
+  if (source.camera != kD435i && source.camera != kOpenNi2) {
+    return fail(ErrorCode::kInvalidArgument,
+                "source.camera: '{}' is no device; there are: d435i, openni2", source.camera);
   }
   if (!source.replay.empty() || !source.realtime) {
     return fail(ErrorCode::kInvalidArgument,
@@ -174,7 +207,7 @@ Result<void> check_camera(const Config& config) {
   }
   Calibration calibration;
   if (!source.calibration.empty()) {
-    auto overlaid = overlay_calibration(source.calibration, calibration);
+    auto overlaid = overlay_calibration(source.calibration, false, calibration);
     if (!overlaid) {
       return overlaid;
     }

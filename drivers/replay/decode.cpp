@@ -18,6 +18,7 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 
+#include "color_row.hpp"
 #include "replay/reader.hpp"
 
 namespace geoflow::drivers {
@@ -138,40 +139,6 @@ void copy_depth_row(const EncodedImage& image, const std::byte* source, std::spa
   }
 }
 
-/// One row of gray or three-channel pixels in the target's format. Gray weights: ITU-R BT.601, as
-/// OpenCV has them.
-void copy_color_row(PixelFormat source_format, const std::byte* source, std::span<std::byte> target,
-                    PixelFormat target_format) {
-  constexpr unsigned kRed = 299;
-  constexpr unsigned kGreen = 587;
-  constexpr unsigned kBlue = 114;
-  constexpr unsigned kSum = kRed + kGreen + kBlue;
-  if (source_format == target_format) {
-    std::memcpy(target.data(), source, target.size());
-    return;
-  }
-  const std::size_t pixels = target.size() / bytes_per_pixel(target_format);
-  const std::size_t step = bytes_per_pixel(source_format);
-  const std::size_t blue = source_format == PixelFormat::kRgb8 ? 2 : 0;
-  for (std::size_t x = 0; x < pixels; ++x) {
-    const std::byte* pixel = source + x * step;
-    const bool gray = step == 1;
-    const std::byte b = gray ? pixel[0] : pixel[blue];
-    const std::byte g = gray ? pixel[0] : pixel[1];
-    const std::byte r = gray ? pixel[0] : pixel[2 - blue];
-    if (target_format == PixelFormat::kGray8) {
-      const unsigned sum = kRed * std::to_integer<unsigned>(r) +
-                           kGreen * std::to_integer<unsigned>(g) +
-                           kBlue * std::to_integer<unsigned>(b);
-      target[x] = static_cast<std::byte>((sum + kSum / 2) / kSum);
-    } else {
-      target[3 * x] = b;
-      target[3 * x + 1] = g;
-      target[3 * x + 2] = r;
-    }
-  }
-}
-
 Result<FrameRef> decode_raw(const EncodedImage& image, const DecodeOptions& options,
                             const AcquireFrame& acquire) {
   const RawLayout& raw = image.raw;
@@ -204,7 +171,7 @@ Result<FrameRef> decode_raw(const EncodedImage& image, const DecodeOptions& opti
     if (shape.format == PixelFormat::kDepth16) {
       copy_depth_row(image, source, target, options.depth_unit_m);
     } else {
-      copy_color_row(raw.shape.format, source, target, shape.format);
+      convert_color_row(raw.shape.format, {source, row_bytes}, shape.format, target);
     }
   }
   return frame;

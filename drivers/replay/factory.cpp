@@ -12,6 +12,7 @@
 #include "can/log_reader.hpp"
 #include "replay/bag/reader.hpp"
 #include "replay/euroc/reader.hpp"
+#include "replay/oni/reader.hpp"
 #include "replay/openloris/reader.hpp"
 #include "replay/reader.hpp"
 #include "replay/scannet/reader.hpp"
@@ -45,6 +46,9 @@ constexpr std::array kFormats = {
     Format{.description = "ScanNet (a .sens file)",
            .looks_like = scannet::looks_like,
            .open = [](const RecordingOptions& options) { return scannet::open(options.path); }},
+    Format{.description = "OpenNI (an .oni file)",
+           .looks_like = oni::looks_like,
+           .open = [](const RecordingOptions& options) { return oni::open(options.path); }},
     Format{.description = "CAN log (a file as candump -L writes it)",
            .looks_like = can::looks_like_log,
            .open =

@@ -7,7 +7,6 @@
 
 #include "geoflow/hal/image.hpp"
 
-#include "d435i/fields.hpp"
 #include "d435i/imu/reports.hpp"
 #include "d435i/monitor/command.hpp"
 #include "d435i/monitor/tables.hpp"
@@ -16,6 +15,7 @@
 #include "d435i/uvc/descriptors.hpp"
 #include "d435i/uvc/metadata.hpp"
 #include "d435i/uvc/payload.hpp"
+#include "fields.hpp"
 #include "reasoned.hpp"
 
 // Any bytes as everything that the camera sends: read, or refused with a reason. The first byte
@@ -80,7 +80,7 @@ std::vector<std::byte> sealed(std::span<const std::byte> bytes, std::uint32_t ty
       crc = (crc >> 1U) ^ ((crc & 1U) != 0 ? kPolynomial : 0U);
     }
   }
-  FieldWriter table;
+  geoflow::drivers::FieldWriter table;
   table.put(std::uint16_t{0}).put(static_cast<std::uint16_t>(type)).put(0U).put(0U).put(~crc);
   table.put_bytes(bytes);
   return std::move(table).take();

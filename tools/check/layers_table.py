@@ -56,7 +56,7 @@ LIBRARIES = (
     Library("libusb", r"libusb", ("PkgConfig::LIBUSB",), ("drivers/usb",)),
     Library("V4L2", r"linux/(videodev2|uvcvideo|media)\.h", (), ("drivers/v4l2",)),
     Library("SocketCAN", r"linux/can", (), ("drivers/can",)),
-    Library("OpenNI2", r"(openni2/)?OpenNI\.h", ("PkgConfig::OPENNI2",), ("drivers/openni2",)),
+    Library("OpenNI2", r"(Driver/)?(OpenNI|Oni[A-Za-z]+)\.h", ("PkgConfig::OPENNI2",), ("drivers/openni2",)),
     Library("DDS", r"dds/", ("CycloneDDS::ddsc", "CycloneDDS-CXX::ddscxx"), ("drivers/dds",)),
     # Only for tests, as tools or as what to compare with.
     Library("GoogleTest", r"(gtest|gmock)/",
@@ -85,6 +85,9 @@ THREAD_FILES = (
     "drivers/dds/robot_source.cpp",  # reads the robot's messages on a thread of its own
     "drivers/dds/robot_source.hpp",
     "drivers/d435i/device/device.cpp",  # tells other threads how the camera is, and waits interruptibly while it is away
+    "drivers/openni2/camera.cpp",  # waits interruptibly while the camera is away
+    "drivers/openni2/module/camera_feed.cpp",  # keeps the camera streaming for a program that has no thread for it
+    "drivers/openni2/module/camera_feed.hpp",
     "drivers/replay/bag/writer.cpp",  # samples are written from the threads that bring them
     "timesync/include/geoflow/timesync/packet_queue.hpp",  # gives up the oldest packet but for its samples
     "timesync/src/packet_queue.cpp",

@@ -43,22 +43,11 @@ class Questions {
     return table(kColorTable).and_then([](const auto& data) { return parse_color_table(data); });
   }
 
-  /// The firmware's own intrinsics of that size, or the table's.
-  [[nodiscard]] Result<CameraIntrinsics> depth_at(const DepthTable& table,
-                                                  const VideoMode& mode) const {
-    const auto listed =
-        ask({.opcode = Opcode::kResolutionIntrinsics}).and_then([](const auto& data) {
-          return parse_resolution_intrinsics(data);
-        });
-    if (listed) {
-      const auto found = std::ranges::find_if(*listed, [&](const CameraIntrinsics& camera) {
-        return camera.width == mode.width && camera.height == mode.height;
-      });
-      if (found != listed->end()) {
-        return *found;
-      }
-    }
-    return depth_intrinsics(table, mode.width, mode.height);
+  /// Empty where the firmware has no such list.
+  [[nodiscard]] std::vector<CameraIntrinsics> resolutions() const {
+    return ask({.opcode = Opcode::kResolutionIntrinsics})
+        .and_then([](const auto& data) { return parse_resolution_intrinsics(data); })
+        .value_or(std::vector<CameraIntrinsics>{});
   }
 
   /// Advanced mode may have changed it.
@@ -97,31 +86,50 @@ class Questions {
 
 }  // namespace
 
-Result<CameraFacts> read_facts(Transport& transport, const VideoMode& depth,
-                               const VideoMode& color) {
+Result<CameraTables> read_tables(Transport& transport) {
   const Questions camera{transport};
   auto versions = camera.versions();
   if (!versions) {
     return tl::unexpected{std::move(versions.error()).in("D435i")};
   }
-  const auto depth_table = camera.depth_table();
-  const auto color_table = camera.color_table();
-  if (!depth_table || !color_table) {
-    return tl::unexpected{depth_table ? color_table.error() : depth_table.error()};
+  auto depth = camera.depth_table();
+  auto color = camera.color_table();
+  if (!depth || !color) {
+    return tl::unexpected{depth ? color.error() : depth.error()};
   }
-  auto depth_camera = camera.depth_at(*depth_table, depth);
+  return CameraTables{.versions = std::move(*versions),
+                      .depth = std::move(*depth),
+                      .color = *color,
+                      .resolutions = camera.resolutions(),
+                      .depth_unit_m = camera.depth_unit_m(),
+                      .imu = camera.imu_table()};
+}
+
+Result<CameraFacts> facts_of(const CameraTables& tables, const VideoMode& depth,
+                             const VideoMode& color) {
+  const auto listed = std::ranges::find_if(tables.resolutions, [&](const CameraIntrinsics& camera) {
+    return camera.width == depth.width && camera.height == depth.height;
+  });
+  const auto depth_camera = listed != tables.resolutions.end()
+                                ? Result<CameraIntrinsics>{*listed}
+                                : depth_intrinsics(tables.depth, depth.width, depth.height);
   if (!depth_camera) {
-    return tl::unexpected{std::move(depth_camera.error())};
+    return tl::unexpected{depth_camera.error()};
   }
-  const SE3& T_depth_cam = color_table->T_depth_cam;
   return CameraFacts{
-      .versions = std::move(*versions),
+      .versions = tables.versions,
       .geometry = {.depth = *depth_camera,
-                   .color = color_intrinsics(*color_table, color.width, color.height),
-                   .T_cam_depth = T_depth_cam.inverse(),
-                   .depth_unit_m = camera.depth_unit_m()},
-      .baseline_m = depth_table->baseline_m,
-      .imu = camera.imu_table()};
+                   .color = color_intrinsics(tables.color, color.width, color.height),
+                   .T_cam_depth = tables.color.T_depth_cam.inverse(),
+                   .depth_unit_m = tables.depth_unit_m},
+      .baseline_m = tables.depth.baseline_m,
+      .imu = tables.imu};
+}
+
+Result<CameraFacts> read_facts(Transport& transport, const VideoMode& depth,
+                               const VideoMode& color) {
+  return read_tables(transport).and_then(
+      [&](const CameraTables& tables) { return facts_of(tables, depth, color); });
 }
 
 Calibration calibration_of(const CameraFacts& facts) {

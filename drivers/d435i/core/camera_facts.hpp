@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/result.hpp"
 
@@ -19,9 +21,27 @@ struct CameraFacts {
   ImuTable imu;                   ///< the factory's where it has one; else as drawn
 };
 
-/// Reads versions, calibration tables and depth unit. Intrinsics of depth come from the firmware's
-/// list by resolution where it has one, else from the table. A camera without IMU calibration is
-/// usual. Errors name the table or the command.
+/// What a camera has in store of itself, for all of its sizes.
+struct CameraTables {
+  Versions versions;
+  DepthTable depth;
+  ColorTable color;
+  /// Of depth, the firmware's own list by resolution; empty where it has none.
+  std::vector<CameraIntrinsics> resolutions{};
+  double depth_unit_m = kDefaultDepthUnit_m;
+  ImuTable imu{};
+};
+
+/// Asks for versions, calibration tables and depth unit. A camera without IMU calibration is usual.
+/// Errors name the table or the command.
+[[nodiscard]] Result<CameraTables> read_tables(Transport& transport);
+
+/// What the tables say of two sizes. Intrinsics of depth come from the firmware's list where that
+/// has the size, else from the table. kNotFound where neither has anything to go by. Pure.
+[[nodiscard]] Result<CameraFacts> facts_of(const CameraTables& tables, const VideoMode& depth,
+                                           const VideoMode& color);
+
+/// Both in one.
 [[nodiscard]] Result<CameraFacts> read_facts(Transport& transport, const VideoMode& depth,
                                              const VideoMode& color);
 

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,9 +23,9 @@
 
 #include "d435i/core/monitor.hpp"
 #include "d435i/core/transport.hpp"
-#include "d435i/fields.hpp"
 #include "d435i/imu/reports.hpp"
 #include "d435i/uvc/descriptors.hpp"
+#include "fields.hpp"
 
 namespace geoflow::drivers::d435i {
 namespace {
@@ -133,15 +135,17 @@ Result<void> Session::start_all(HostTime now) {
   if (auto started = start_all_video(now); !started) {
     return started;
   }
-  for (const ImuSensor sensor : kSensors) {
-    sensors_.at(index_of(sensor)).retry = kImuPatience;
-    start_imu(sensor, now);
+  if (options_.imu) {
+    for (const ImuSensor sensor : kSensors) {
+      sensors_.at(index_of(sensor)).retry = kImuPatience;
+      start_imu(sensor, now);
+    }
   }
   return {};
 }
 
 Result<void> Session::start_all_video(HostTime now) {
-  for (const VideoStream stream : kStreams) {
+  for (const VideoStream stream : wanted_streams()) {
     if (auto started = start_video(stream, now); !started) {
       return started;
     }
@@ -151,7 +155,7 @@ Result<void> Session::start_all_video(HostTime now) {
 
 Result<void> Session::start_video(VideoStream stream, HostTime now) {
   streams_.at(index_of(stream)) = {.deadline = now + kStartPatience, .heard = false};
-  auto started = transport_->start_video(stream, mode_of(stream));
+  auto started = transport_->start_video(stream, *mode_of(stream));
   return started ? started : tl::unexpected{std::move(started.error()).in(name_of(stream))};
 }
 
@@ -194,9 +198,7 @@ void Session::on_frame(const RawFrame& frame) {
   const std::size_t index = index_of(frame.stream);
   ++counters_.frames.at(index);
   streams_.at(index) = {.deadline = frame.t_arrival + patience(frame.stream), .heard = true};
-  const bool all_run =
-      std::ranges::all_of(streams_, [](const Stream& stream) { return stream.heard; });
-  if (all_run && (rung_ > 0 || back_off_ > Duration::zero())) {
+  if (all_video_heard() && (rung_ > 0 || back_off_ > Duration::zero())) {
     rung_ = 0;
     back_off_ = Duration::zero();
     trouble_.clear();
@@ -226,7 +228,7 @@ void Session::on_damaged_imu(std::string_view why) {
 
 void Session::watch_video(HostTime now) {
   std::vector<VideoStream> stalled;
-  for (const VideoStream stream : kStreams) {
+  for (const VideoStream stream : wanted_streams()) {
     if (now > streams_.at(index_of(stream)).deadline) {
       ++counters_.stalls;
       stalled.push_back(stream);
@@ -277,7 +279,7 @@ void Session::climb(const std::vector<VideoStream>& stalled, HostTime now) {
 void Session::watch_imu(HostTime now) {
   for (const ImuSensor sensor : kSensors) {
     Sensor& state = sensors_.at(index_of(sensor));
-    if (now <= state.deadline) {
+    if (!options_.imu || now <= state.deadline) {
       continue;
     }
     ++counters_.imu_restarts;
@@ -302,12 +304,25 @@ void Session::lose(HostTime now, const std::string& why) {
   back_off_ = std::clamp(2 * back_off_, kFirstBackOff, kLongestBackOff);
 }
 
-const VideoMode& Session::mode_of(VideoStream stream) const noexcept {
+const std::optional<VideoMode>& Session::mode_of(VideoStream stream) const noexcept {
   return stream == VideoStream::kDepth ? options_.depth : options_.color;
 }
 
+std::vector<VideoStream> Session::wanted_streams() const {
+  std::vector<VideoStream> wanted;
+  std::ranges::copy_if(kStreams, std::back_inserter(wanted),
+                       [this](VideoStream stream) { return mode_of(stream).has_value(); });
+  return wanted;
+}
+
+bool Session::all_video_heard() const {
+  return std::ranges::all_of(kStreams, [this](VideoStream stream) {
+    return !mode_of(stream) || streams_.at(index_of(stream)).heard;
+  });
+}
+
 Duration Session::patience(VideoStream stream) const noexcept {
-  const Duration interval = Duration{seconds{1}} / std::max(mode_of(stream).rate_hz, 1);
+  const Duration interval = Duration{seconds{1}} / std::max(mode_of(stream)->rate_hz, 1);
   return std::max(kPatienceFrames * interval, kLeastPatience);
 }
 

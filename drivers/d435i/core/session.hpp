@@ -20,10 +20,11 @@ namespace geoflow::drivers::d435i {
 
 /// How the camera is to run. What is none is left as the camera has it.
 struct SessionOptions {
-  VideoMode depth;
-  VideoMode color;
+  std::optional<VideoMode> depth;       ///< none: this stream is not wanted
+  std::optional<VideoMode> color;       ///< likewise
   int accel_hz = 200;                   // NOLINT(readability-magic-numbers): named by its member
   int gyro_hz = 200;                    // NOLINT(readability-magic-numbers): likewise
+  bool imu = true;                      ///< false: neither of its sensors is started
   std::optional<bool> emitter{};        ///< the pattern projector
   std::optional<int> exposure_us{};     ///< of depth; turns automatic exposure off
   std::optional<int> laser_power_mw{};  ///< of the projector
@@ -107,7 +108,9 @@ class Session final : private TransportSink {
   void watch_imu(HostTime now);
   void climb(const std::vector<VideoStream>& stalled, HostTime now);
   void lose(HostTime now, const std::string& why);
-  [[nodiscard]] const VideoMode& mode_of(VideoStream stream) const noexcept;
+  [[nodiscard]] const std::optional<VideoMode>& mode_of(VideoStream stream) const noexcept;
+  [[nodiscard]] std::vector<VideoStream> wanted_streams() const;
+  [[nodiscard]] bool all_video_heard() const;
   [[nodiscard]] Duration patience(VideoStream stream) const noexcept;
 
   SessionOptions options_;

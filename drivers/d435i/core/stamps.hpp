@@ -1,8 +1,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "geoflow/hal/time.hpp"
 
@@ -16,6 +18,15 @@ template <typename Clock>
 [[nodiscard]] DeviceTime<Clock> device_time(std::uint32_t count_us) noexcept {
   return DeviceTime<Clock>{std::chrono::microseconds{count_us}};
 }
+
+/// What a frame's header says of its time.
+struct FrameStamp {
+  std::uint32_t t_us = 0;  ///< the middle of the exposure where the metadata tells it, else its end
+  std::optional<std::uint32_t> counter{};  ///< of the camera's frames; none: not in the header
+};
+
+/// None where the header, which may be empty, has no stamp or is damaged. Pure.
+[[nodiscard]] std::optional<FrameStamp> read_frame_stamp(std::span<const std::byte> header);
 
 /// Stamps of one stream, by the device where a sample carries its stamp. One that does not gets the
 /// stamp that its arrival asks for, going by the newest sample that did; before there is one, the

@@ -36,9 +36,11 @@ using d435i::Session;
 constexpr Duration kLongestWait = std::chrono::milliseconds{50};
 
 d435i::SessionOptions session_options(const D435iOptions& options) {
-  using d435i::PixelCoding;
-  return {.depth = {PixelCoding::kZ16, options.width, options.height, options.rate_hz},
-          .color = {PixelCoding::kYuyv, options.width, options.height, options.rate_hz},
+  const auto mode = [&](d435i::PixelCoding coding) {
+    return d435i::VideoMode{coding, options.width, options.height, options.rate_hz};
+  };
+  return {.depth = mode(d435i::PixelCoding::kZ16),
+          .color = mode(d435i::PixelCoding::kYuyv),
           .accel_hz = options.accel_hz,
           .gyro_hz = options.gyro_hz,
           .emitter = options.emitter,
@@ -172,7 +174,7 @@ Result<std::unique_ptr<D435i>> d435i::open_device(const D435iOptions& options,
     return tl::unexpected{std::move(transport.error())};
   }
   const SessionOptions wanted = session_options(options);
-  const auto facts = read_facts(**transport, wanted.depth, wanted.color);
+  const auto facts = read_facts(**transport, *wanted.depth, *wanted.color);
   if (!facts) {
     return tl::unexpected{facts.error()};
   }

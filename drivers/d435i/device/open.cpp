@@ -1,3 +1,5 @@
+#include "d435i/device/open.hpp"
+
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -49,8 +51,9 @@ Result<std::unique_ptr<Transport>> open_by_usb(const std::string& serial) {
       });
 }
 
-/// The kernel's drivers where they show depth, colour and both sensors; else USB.
-Result<std::unique_ptr<Transport>> open_by_either(const std::string& serial) {
+}  // namespace
+
+Result<std::unique_ptr<Transport>> d435i::open_by_either(const std::string& serial) {
   constexpr std::size_t kImuSensors = 2;
   const auto cameras = v4l2::find_cameras(d435i::kVendor, d435i::kProduct);
   const auto camera = std::ranges::find_if(
@@ -65,8 +68,6 @@ Result<std::unique_ptr<Transport>> open_by_either(const std::string& serial) {
   return open_by_usb(serial);
 }
 
-}  // namespace
-
 Result<std::unique_ptr<D435i>> D435i::open(const D435iOptions& options) {
   switch (options.transport) {
     case D435iTransport::kV4l2:
@@ -76,7 +77,7 @@ Result<std::unique_ptr<D435i>> D435i::open(const D435iOptions& options) {
     case D435iTransport::kAuto:
       break;
   }
-  return d435i::open_device(options, &open_by_either);
+  return d435i::open_device(options, &d435i::open_by_either);
 }
 
 }  // namespace geoflow::drivers

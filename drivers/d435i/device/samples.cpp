@@ -22,16 +22,12 @@
 #include "d435i/monitor/tables.hpp"
 #include "d435i/pixels/registration.hpp"
 #include "d435i/pixels/yuyv.hpp"
-#include "d435i/uvc/metadata.hpp"
-#include "d435i/uvc/payload.hpp"
 
 namespace geoflow::drivers::d435i {
 namespace {
 
 // What the pipeline's queues may hold of both kinds, and what the estimator keeps.
 constexpr std::size_t kPooledFrames = 48;
-// No exposure's middle is further from its frame's stamp: a slow one of 6 Hz has 83 ms.
-constexpr std::uint32_t kLargestOpticalTime_us = 200'000;
 // More frames than this between two counters is a counter that began anew.
 constexpr std::uint32_t kLargestGap = 1000;
 
@@ -73,22 +69,11 @@ void SampleMaker::on_frame(const RawFrame& frame) {
 }
 
 std::optional<std::uint32_t> SampleMaker::read_header(const RawFrame& frame) {
-  if (frame.header.empty()) {
-    return std::nullopt;
+  const auto stamp = read_frame_stamp(frame.header);
+  if (stamp && stamp->counter) {
+    count_missed(frame.stream, *stamp->counter);
   }
-  const auto header = parse_payload_header(frame.header);
-  if (!header || !header->pts_us) {
-    return std::nullopt;
-  }
-  const auto metadata = parse_metadata(header->metadata);
-  if (!metadata || !metadata->timing) {
-    return header->pts_us;
-  }
-  if (metadata->timing->frame_counter) {
-    count_missed(frame.stream, *metadata->timing->frame_counter);
-  }
-  const std::uint32_t optical_us = metadata->timing->optical_time_us.value_or(0);
-  return *header->pts_us - (optical_us <= kLargestOpticalTime_us ? optical_us : 0);
+  return stamp ? std::optional{stamp->t_us} : std::nullopt;
 }
 
 void SampleMaker::count_missed(VideoStream stream, std::uint32_t counter) noexcept {

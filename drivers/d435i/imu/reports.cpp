@@ -14,7 +14,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 
-#include "d435i/fields.hpp"
+#include "fields.hpp"
 
 namespace geoflow::drivers::d435i {
 namespace {

@@ -20,8 +20,8 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/result.hpp"
 
-#include "d435i/fields.hpp"
 #include "d435i/monitor/command.hpp"
+#include "fields.hpp"
 
 namespace geoflow::drivers::d435i {
 namespace {

@@ -23,7 +23,7 @@ constexpr int kGreenFromV = 53279;  // 0.714136 * 255 / 224
 constexpr int kBlueFromU = 132201;  // 1.772 * 255 / 224
 
 constexpr std::size_t kPairBytes = 4;  // Y0 U Y1 V
-constexpr std::size_t kBgrPairBytes = 6;
+constexpr std::size_t kColorPairBytes = 6;
 
 void to_gray(const std::uint8_t* source, std::size_t pixels, std::uint8_t* target) {
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -36,20 +36,22 @@ std::uint8_t clamped(int value) {
   return static_cast<std::uint8_t>(std::clamp(value >> kShift, 0, kLargest));
 }
 
-void to_bgr(const std::uint8_t* source, std::size_t pixels, std::uint8_t* target) {
+/// `kRed` is red's place in a pixel, 0 or 2; blue has the other.
+template <std::size_t kRed>
+void to_color(const std::uint8_t* source, std::size_t pixels, std::uint8_t* target) {
   for (std::size_t pair = 0; pair < pixels / 2; ++pair) {
     const std::uint8_t* yuyv = source + pair * kPairBytes;
-    std::uint8_t* bgr = target + pair * kBgrPairBytes;
+    std::uint8_t* pixel = target + pair * kColorPairBytes;
     const int u = yuyv[1] - kChromaOffset;
     const int v = yuyv[3] - kChromaOffset;
     const int blue = kBlueFromU * u + kHalf;
     const int green = -kGreenFromU * u - kGreenFromV * v + kHalf;
     const int red = kRedFromV * v + kHalf;
-    for (int i = 0; i < 2; ++i, bgr += 3) {
+    for (int i = 0; i < 2; ++i, pixel += 3) {
       const int luma = kLuma * (yuyv[2 * i] - kLumaOffset);
-      bgr[0] = clamped(luma + blue);
-      bgr[1] = clamped(luma + green);
-      bgr[2] = clamped(luma + red);
+      pixel[2 - kRed] = clamped(luma + blue);
+      pixel[1] = clamped(luma + green);
+      pixel[kRed] = clamped(luma + red);
     }
   }
 }
@@ -71,9 +73,11 @@ Result<void> convert_yuyv(std::span<const std::byte> source, const ImageShape& s
   if (shape.format == PixelFormat::kGray8) {
     to_gray(from, pixels, to);
   } else if (shape.format == PixelFormat::kBgr8) {
-    to_bgr(from, pixels, to);
+    to_color<2>(from, pixels, to);
+  } else if (shape.format == PixelFormat::kRgb8) {
+    to_color<0>(from, pixels, to);
   } else {
-    return fail(ErrorCode::kUnsupported, "YUYV becomes gray or BGR only");
+    return fail(ErrorCode::kUnsupported, "YUYV becomes gray, BGR or RGB only");
   }
   return {};
 }

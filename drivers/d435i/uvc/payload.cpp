@@ -8,8 +8,8 @@
 
 #include "geoflow/hal/result.hpp"
 
-#include "d435i/fields.hpp"
 #include "d435i/uvc/descriptors.hpp"
+#include "fields.hpp"
 
 namespace geoflow::drivers::d435i {
 namespace {

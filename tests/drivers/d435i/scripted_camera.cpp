@@ -171,7 +171,9 @@ class ScriptedTransport final : public Transport {
       sink.on_damaged_frame(stream, "half of it is missing");
       return;
     }
-    const Bytes pixels(frame_bytes_.at(i));
+    const Bytes pixels = camera_.pixels
+                             ? camera_.pixels(stream, camera_.frame_counter, frame_bytes_.at(i))
+                             : Bytes(frame_bytes_.at(i));
     const Bytes header = golden_depth_header(camera_.clock_us, camera_.frame_counter);
     sink.on_frame({.stream = stream,
                    .pixels = pixels,

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,6 +31,9 @@ struct ScriptedCamera {
   std::map<std::uint32_t, Bytes> tables;  ///< by id; filled with the golden ones
   std::optional<Bytes> imu_table{};
   std::optional<Bytes> resolution_list{};
+
+  /// The bytes of frame number n of a stream; none: zeros.
+  std::function<Bytes(VideoStream, std::uint32_t, std::size_t)> pixels{};
 
   // What goes wrong.
   std::array<bool, kVideoStreams> silent{};        ///< no frame comes

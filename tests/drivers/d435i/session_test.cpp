@@ -48,8 +48,8 @@ class SessionTest : public testing::Test {
   void SetUp() override { log::set_level(log::Level::kError); }
   void TearDown() override { log::set_level(log::Level::kInfo); }
   static SessionOptions options() {
-    return {.depth = {PixelCoding::kZ16, 640, 480, 30},
-            .color = {PixelCoding::kYuyv, 640, 480, 30}};
+    return {.depth = VideoMode{PixelCoding::kZ16, 640, 480, 30},
+            .color = VideoMode{PixelCoding::kYuyv, 640, 480, 30}};
   }
 
   /// Steps the session for so long on the camera's clock.
@@ -214,7 +214,7 @@ TEST_F(SessionTest, AnotherCameraIsNotTakenForTheFirst) {
 TEST_F(SessionTest, AUsb2LinkWithoutTheModeIsSaidInWords) {
   camera_.super_speed = false;
   auto wanted = options();
-  wanted.depth.width = 848;
+  wanted.depth->width = 848;
   Session session{wanted, camera_.opener(), recorder_};
   (void)session.step(camera_.now, milliseconds{50});
   EXPECT_EQ(session.state(), SessionState::kAway);
@@ -256,6 +256,32 @@ TEST_F(SessionTest, ClosingStopsEverything) {
   EXPECT_EQ(camera_.count("stop depth"), 1);
   EXPECT_EQ(camera_.count("stop colour"), 1);
   EXPECT_EQ(session_.link(), nullptr);
+}
+
+TEST_F(SessionTest, OneStreamAloneWithoutTheImuRunsAndRecovers) {
+  SessionOptions wanted = options();
+  wanted.color.reset();
+  wanted.imu = false;
+  Session session{wanted, camera_.opener(), recorder_};
+  const auto run = [&](Duration duration) {
+    const HostTime end = camera_.now + duration;
+    while (camera_.now < end) {
+      camera_.now += session.step(camera_.now, milliseconds{50});
+    }
+  };
+  run(seconds{4});
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_GT(session.counters().frames[0], 100U);
+  EXPECT_EQ(session.counters().frames[1], 0U);
+  EXPECT_EQ(session.counters().imu_restarts, 0U);
+  EXPECT_EQ(camera_.count("start colour"), 0);
+  EXPECT_EQ(camera_.count("start gyro"), 0);
+  camera_.silent[0] = true;
+  run(seconds{1});
+  EXPECT_EQ(session.trouble(), "depth fell silent");
+  camera_.silent[0] = false;
+  run(seconds{3});
+  EXPECT_TRUE(session.trouble().empty()) << session.trouble();
 }
 
 }  // namespace

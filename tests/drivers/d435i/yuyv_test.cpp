@@ -40,6 +40,19 @@ TEST(Yuyv, ColoursAreThoseOfBt601) {
   near(bgr_of(41, 240, 110), {255, 0, 0});
 }
 
+TEST(Yuyv, RgbIsBgrBackwards) {
+  const Bytes yuyv = from_hex("51 5a 30 f0 91 36 80 22");
+  Bytes bgr(12);
+  Bytes rgb(12);
+  ASSERT_TRUE(convert_yuyv(yuyv, {4, 1, PixelFormat::kBgr8}, bgr));
+  ASSERT_TRUE(convert_yuyv(yuyv, {4, 1, PixelFormat::kRgb8}, rgb));
+  for (std::size_t i = 0; i < bgr.size(); i += 3) {
+    EXPECT_EQ(rgb[i], bgr[i + 2]);
+    EXPECT_EQ(rgb[i + 1], bgr[i + 1]);
+    EXPECT_EQ(rgb[i + 2], bgr[i]);
+  }
+}
+
 TEST(Yuyv, RefusesOtherSizesAndFormats) {
   Bytes target(16);
   EXPECT_FALSE(convert_yuyv(from_hex("01 80 02"), {2, 1, PixelFormat::kGray8}, target));

@@ -27,7 +27,7 @@ struct SourceConfig {
   std::uint64_t fault_seed = 0;
   bool realtime = true;  ///< at the pace it was recorded; else as fast as it can be worked on
   bool loop = false;     ///< begin again at its end
-  std::string camera{};  ///< `d435i`: camera and IMU are that device; empty: the recording's
+  std::string camera{};  ///< `d435i` (with its IMU) or `openni2`; empty: the recording's
   std::string legs{};    ///< `can` or `dds`: from there; empty: from the recording
   std::string imu{};     ///< `dds`: the body's IMU instead of the camera's; empty: the recording's
 };
@@ -45,6 +45,14 @@ struct CameraConfig {
   bool emitter = true;       ///< the pattern projector
   int laser_power_mw = 150;  ///< its power
   int exposure_us = 0;       ///< of depth; 0: automatic
+};
+
+/// How a camera of OpenNI2's is run (docs/openni2.md).
+struct OpenNi2Config {
+  std::string uri;   ///< OpenNI's name of the device, or an .oni file; empty: the first device
+  int width = 640;   ///< of colour and depth [px]
+  int height = 480;  ///< [px]
+  int rate_hz = 30;
 };
 
 /// The two sockets and what their clients may do.
@@ -76,6 +84,7 @@ struct Config {
   SourceConfig source;
   drivers::TopicNames topics;
   CameraConfig d435i;
+  OpenNi2Config openni2;
   drivers::CanLegsOptions can;
   drivers::DdsRobotOptions dds;
   timesync::SynchroniserConfig synchroniser;

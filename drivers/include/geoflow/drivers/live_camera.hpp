@@ -24,8 +24,9 @@ class LiveCamera {
   /// Null where it has none.
   [[nodiscard]] virtual Imu* imu() = 0;
 
-  /// Streams until stopped, through every loss of the device that can be mended. Returns within a
-  /// tenth of a second of the stop.
+  /// Streams until stopped, through every loss of the device that can be mended; a file that stands
+  /// in for a device ends by itself. Returns within a tenth of a second of the stop, or as soon as
+  /// a device that is being opened lets it.
   virtual void run(const std::stop_token& stop) = 0;
   /// How often run() has gone round: again within a few seconds, whether or not the device is there,
   /// but while that is opened or reset. Any thread, but not from inside a sink.

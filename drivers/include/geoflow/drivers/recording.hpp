@@ -55,7 +55,7 @@ struct StreamSummary {
 };
 
 struct RecordingInfo {
-  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `scannet`, `candump`, `euroc`
+  std::string format;  ///< `tum`, `rosbag2`, `openloris`, `scannet`, `oni`, `candump`, `euroc`
   HostTime start;      ///< stamp of the first sample, on the recording's time line
   HostTime end;        ///< stamp of the last sample
   std::vector<StreamSummary> streams;

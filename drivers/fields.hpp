@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-/// Little-endian fields, packed, as USB and the camera's firmware write them.
-namespace geoflow::drivers::d435i {
+/// Little-endian fields, packed, as devices and files have them.
+namespace geoflow::drivers {
 
 static_assert(std::endian::native == std::endian::little);
 
@@ -85,4 +85,4 @@ class FieldWriter {
   std::vector<std::byte> record_;
 };
 
-}  // namespace geoflow::drivers::d435i
+}  // namespace geoflow::drivers
