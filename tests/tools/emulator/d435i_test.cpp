@@ -123,31 +123,6 @@ TEST_F(D435iTest, TakesOfARecordingWhatTheRateAsksFor) {
   EXPECT_EQ(fetch(0x82, Duration{2'100'000'000}).size(), 12U) << "6 frames a second for 2 s";
 }
 
-TEST_F(D435iTest, DropsTheOldestFramesThatNobodyFetches) {
-  add_frames(20);
-  plug();
-  ASSERT_TRUE(commit(1, 1, 5, k30Fps));
-  EXPECT_TRUE(fetch(0x82, kMillisecond).empty());
-  now += Duration{1'000'000'000};
-  const auto payloads = fetch(0x82, kMillisecond);
-  ASSERT_EQ(payloads.size(), 4U);
-  EXPECT_EQ(field<std::uint32_t>(payloads[3], 28), 20U);
-  EXPECT_EQ(camera->counters().frames_dropped, 16U);
-}
-
-TEST_F(D435iTest, ClearHaltEmptiesAStreamAndFetchingGoesOn) {
-  add_frames(60);
-  plug();
-  ASSERT_TRUE(commit(1, 1, 5, k30Fps));
-  EXPECT_EQ(fetch(0x82, Duration{100'000'000}).size(), 3U);
-  now += Duration{70'000'000};
-  ASSERT_TRUE(set(0x02, 1, 0, 0x82, {}));
-  EXPECT_EQ(camera->next_due(0x82, now), HostTime::max())
-      << "nobody fetches: the world stands still";
-  now += Duration{10'000'000'000};
-  EXPECT_EQ(fetch(0x82, Duration{100'000'000}).size(), 3U);
-}
-
 TEST_F(D435iTest, AllFormatsAreOfTheirSize) {
   add_frames(60);
   plug();

@@ -101,7 +101,8 @@ class Camera final : public D435i {
   [[nodiscard]] VideoStream& stream(VideoStreamId id) {
     return streams_[static_cast<std::size_t>(id)];
   }
-  [[nodiscard]] VideoStream* stream_at(std::uint8_t endpoint);
+  /// By its interface's number or endpoint; null where it has no such stream.
+  [[nodiscard]] VideoStream* stream_with(std::uint8_t VideoInterface::* id, std::uint8_t value);
   /// Lets what has happened in the world up to now reach the sensors.
   void live(HostTime now);
   void sense(const WorldSample& sample);
@@ -117,6 +118,7 @@ class Camera final : public D435i {
   MotionModule motion_;
   std::array<VideoStream, kVideoStreamCount> streams_;
   std::uint8_t configuration_ = 0;
+  HostTime fetched_at_{};  ///< from any stream, the last time
   std::optional<HostTime> powered_at_;
   std::optional<HostTime> back_at_;  ///< while it restarts
   ColorFrame last_color_;
@@ -153,13 +155,11 @@ void Camera::reset(HostTime now) {
   forget();
 }
 
-VideoStream* Camera::stream_at(std::uint8_t endpoint) {
-  for (std::size_t i = 0; i < streams_.size(); ++i) {
-    if (video_interfaces()[i].endpoint == endpoint) {
-      return &streams_[i];
-    }
-  }
-  return nullptr;
+VideoStream* Camera::stream_with(std::uint8_t VideoInterface::* id, std::uint8_t value) {
+  const auto found = std::ranges::find(video_interfaces(), value, id);
+  return found != video_interfaces().end()
+             ? &streams_.at(static_cast<std::size_t>(found - video_interfaces().begin()))
+             : nullptr;
 }
 
 bool Camera::fits(const FrameRef& image) const {
@@ -212,9 +212,13 @@ void Camera::live(HostTime now) {
   if (!powered_at_) {
     powered_at_ = now;
   }
+  bool left = false;
+  for (VideoStream& video : streams_) {
+    left |= video.end_if_left(now);
+  }
   const bool watching =
       motion_.active() || std::ranges::any_of(streams_, [](const auto& s) { return s.active(); });
-  player_.run(watching, now);
+  player_.run(watching, left ? fetched_at_ : now);
   while (const auto sample = player_.next(now)) {
     sense(*sample);
   }
@@ -264,12 +268,18 @@ std::optional<Bytes> Camera::standard(const SetupPacket& setup) {
     case kGetInterface:
       return ByteWriter{}.u8(0).take();
     case kSetInterface:
-      return setup.value == 0 ? std::optional{Bytes{}} : std::nullopt;
+      if (setup.value != 0) {
+        return std::nullopt;  // no interface has another setting
+      }
+      if (VideoStream* video = stream_with(&VideoInterface::number, index)) {
+        video->clear();
+      }
+      return Bytes{};
     case kGetStatus:
       return ByteWriter{}.u16(recipient_of(setup) == kDevice ? 1 : 0).take();  // self-powered
     case kClearFeature:
       if (recipient_of(setup) == kEndpoint && setup.value == kEndpointHalt) {
-        if (VideoStream* video = stream_at(index)) {
+        if (VideoStream* video = stream_with(&VideoInterface::endpoint, index)) {
           video->clear();
         }
       }
@@ -304,12 +314,8 @@ std::optional<Bytes> Camera::class_request(const SetupPacket& setup, std::span<c
     }
     return controls_.request(setup, out);
   }
-  for (std::size_t i = 0; i < streams_.size(); ++i) {
-    if (video_interfaces()[i].number == interface && entity == 0) {
-      return streams_[i].request(setup, out);
-    }
-  }
-  return std::nullopt;
+  VideoStream* const video = stream_with(&VideoInterface::number, interface);
+  return video != nullptr && entity == 0 ? video->request(setup, out) : std::nullopt;
 }
 
 std::optional<Bytes> Camera::monitor(const SetupPacket& setup, std::span<const std::byte> out,
@@ -344,9 +350,10 @@ InTransfer Camera::next_in(std::uint8_t endpoint, HostTime now) {
   if (endpoint == kHidEndpoint) {
     data = motion_.next_report();
     reports_sent_ += data ? 1U : 0U;
-  } else if (VideoStream* video = stream_at(endpoint)) {
+  } else if (VideoStream* video = stream_with(&VideoInterface::endpoint, endpoint)) {
     const bool was_active = video->active();
-    data = video->fetch(controls_);
+    fetched_at_ = now;
+    data = video->fetch(controls_, now);
     if (!was_active) {
       live(now);
     }
@@ -358,7 +365,7 @@ HostTime Camera::next_due(std::uint8_t endpoint, HostTime now) {
   if (back_at_) {
     return *back_at_;
   }
-  const VideoStream* video = stream_at(endpoint);
+  const VideoStream* video = stream_with(&VideoInterface::endpoint, endpoint);
   if (video == nullptr && endpoint != kHidEndpoint) {
     return HostTime::max();
   }

@@ -33,6 +33,8 @@ constexpr std::uint32_t kLongestHeader = 255;
 constexpr std::uint32_t kClockHz = 48'000'000;
 constexpr std::size_t kMostFrames = 4;  // not yet fetched
 constexpr Duration kIntervalUnit{100};
+// A host that wants frames asks all the time; a slow one may be busy for some of it.
+constexpr Duration kLongestSilence = std::chrono::seconds{2};
 
 }  // namespace
 
@@ -139,8 +141,9 @@ void VideoStream::see(SeenFrame frame) {
   frames_.push_back({std::move(frame), ++counter_});
 }
 
-std::optional<Bytes> VideoStream::fetch(const UvcControls& controls) {
+std::optional<Bytes> VideoStream::fetch(const UvcControls& controls, HostTime now) {
   fetched_ = committed_;
+  fetched_at_ = now;
   if (frames_.empty()) {
     return std::nullopt;
   }
@@ -172,6 +175,14 @@ void VideoStream::clear() {
   fetched_ = false;
   due_.reset();
   frames_.clear();
+}
+
+bool VideoStream::end_if_left(HostTime now) {
+  const bool left = active() && now - fetched_at_ > kLongestSilence;
+  if (left) {
+    clear();
+  }
+  return left;
 }
 
 void VideoStream::reset() {

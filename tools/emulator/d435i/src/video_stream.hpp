@@ -29,7 +29,8 @@ struct SeenFrame {
 /// One VideoStreaming interface: negotiation, and frames until the host fetches them. It streams
 /// from a commit on, while the host fetches: CLEAR_FEATURE(ENDPOINT_HALT) empties it, and the next
 /// fetch goes on. (uvcvideo stops a bulk camera by that request and fetches no more; librealsense's
-/// libusb backend sends it after the commit and when frames fail to come, and goes on.)
+/// libusb backend sends it after the commit and when frames fail to come, and goes on.) So does
+/// SET_INTERFACE. A host that only fetches no more has left the stream after a while.
 class VideoStream {
  public:
   VideoStream(VideoStreamId id, const Calibration& calibration);
@@ -45,9 +46,11 @@ class VideoStream {
   /// Takes a frame, if it is one of those that the committed rate asks for.
   void see(SeenFrame frame);
   /// The oldest frame not yet fetched, as a UVC payload.
-  [[nodiscard]] std::optional<Bytes> fetch(const UvcControls& controls);
-  /// CLEAR_FEATURE(ENDPOINT_HALT).
+  [[nodiscard]] std::optional<Bytes> fetch(const UvcControls& controls, HostTime now);
+  /// CLEAR_FEATURE(ENDPOINT_HALT), or SET_INTERFACE.
   void clear();
+  /// clear(), where it is active but nobody has fetched for two seconds; whether that was so.
+  bool end_if_left(HostTime now);
   /// As after power-on.
   void reset();
 
@@ -75,6 +78,7 @@ class VideoStream {
   std::optional<ImagePacker> packer_;
   bool committed_ = false;
   bool fetched_ = false;
+  HostTime fetched_at_{};  // the last time
   std::optional<Duration> due_;
   struct Numbered {
     SeenFrame frame;

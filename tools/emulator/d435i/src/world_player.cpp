@@ -1,5 +1,6 @@
 #include "src/world_player.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -12,7 +13,7 @@ void WorldPlayer::run(bool running, HostTime now) noexcept {
   if (running && !running_) {
     start_ = now - paused_at_;
   } else if (!running && running_) {
-    paused_at_ = now - start_;
+    paused_at_ = std::max(now - start_, newest_);
   }
   running_ = running;
 }
@@ -35,6 +36,7 @@ std::optional<WorldSample> WorldPlayer::next(HostTime now) {
   }
   auto sample = std::exchange(ahead_, std::nullopt);
   if (sample) {
+    newest_ = sample->t_sent;
     start_ = sample->resumes ? now - sample->t_sent : start_;
     shift_ = host_time(sample->t_sent).time_since_epoch() - sample->t_sent_recorded;
   }

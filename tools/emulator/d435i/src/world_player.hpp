@@ -18,6 +18,7 @@ class WorldPlayer {
   explicit WorldPlayer(std::unique_ptr<World> world) noexcept : world_{std::move(world)} {}
 
   [[nodiscard]] const Calibration& calibration() const { return world_->calibration(); }
+  /// `now` may be earlier than the newest sample: then the world pauses at that one.
   void run(bool running, HostTime now) noexcept;
   /// The next sample whose time has come, or none.
   [[nodiscard]] std::optional<WorldSample> next(HostTime now);
@@ -38,6 +39,7 @@ class WorldPlayer {
   bool running_ = false;
   HostTime start_{};      ///< of the world, while it runs
   Duration paused_at_{};  ///< on the world's time line
+  Duration newest_{};     ///< when the newest sample was sent, likewise
   std::optional<Duration> shift_{};
   std::uint64_t errors_ = 0;
 };
