@@ -171,8 +171,8 @@ Result<void> open_camera(const Config& config, PixelFormat color, Sources& sourc
   }
   return config.source.calibration.empty()
              ? Result<void>{}
-             : overlay_calibration(config.source.calibration,
-                                   config.source.camera == kOpenNi2, sources.calibration);
+             : overlay_calibration(config.source.calibration, config.source.camera == kOpenNi2,
+                                   sources.calibration);
 }
 
 constexpr std::string_view kCan = "can";

@@ -28,8 +28,8 @@ class LiveCamera {
   /// in for a device ends by itself. Returns within a tenth of a second of the stop, or as soon as
   /// a device that is being opened lets it.
   virtual void run(const std::stop_token& stop) = 0;
-  /// How often run() has gone round: again within a few seconds, whether or not the device is there,
-  /// but while that is opened or reset. Any thread, but not from inside a sink.
+  /// How often run() has gone round: again within a few seconds, whether or not the device is
+  /// there, but while that is opened or reset. Any thread, but not from inside a sink.
   [[nodiscard]] virtual std::uint64_t turns() const = 0;
 };
 
