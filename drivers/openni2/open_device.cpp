@@ -162,8 +162,9 @@ Calibration OpenDevice::calibration() const {
   calibration.camera = {
       .width = mode.getResolutionX(),
       .height = mode.getResolutionY(),
-      .fx = width / (2 * std::tan(double{color_.video.getHorizontalFieldOfView()} / 2)),
-      .fy = height / (2 * std::tan(double{color_.video.getVerticalFieldOfView()} / 2)),
+      .fx =
+          width / (2 * std::tan(static_cast<double>(color_.video.getHorizontalFieldOfView()) / 2)),
+      .fy = height / (2 * std::tan(static_cast<double>(color_.video.getVerticalFieldOfView()) / 2)),
       .cx = (width - 1) / 2,
       .cy = (height - 1) / 2};
   const bool fine =
