@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include <OniEnums.h>
 #include <OpenNI.h>
 #include <tl/expected.hpp>
 
@@ -22,7 +23,6 @@
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
-#include "geoflow/hal/samples.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "openni2/open_device.hpp"
@@ -104,9 +104,9 @@ class OpenNi2Camera final : public LiveCamera {
       lose(frame.error().message);
       return false;
     }
-    if (*frame) {
+    if (const auto& arrived = *frame) {
       newest_ = now;
-      deliver(**frame, now);
+      deliver(*arrived, now);
       return true;
     }
     if (now - newest_ > kPatience) {

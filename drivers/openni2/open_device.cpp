@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include <OniEnums.h>
 #include <OpenNI.h>
+#include <fmt/core.h>
 #include <fmt/format.h>
 #include <tl/expected.hpp>
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string_view>
 
+#include <OniEnums.h>
 #include <OpenNI.h>
 
 #include "geoflow/drivers/openni2_camera.hpp"

@@ -27,7 +27,8 @@ using AnySample = std::variant<Arrival<CameraClock, ColorFrame>, Arrival<CameraC
 /// How much a queue may hold before samples are lost.
 struct QueueLimits {
   // A camera's driver has 48 buffers (drivers/d435i/device/samples.cpp), and needs some itself.
-  std::size_t images = 40;      ///< of both kinds
+  std::size_t images =
+      40;  ///< of both kinds  NOLINT(readability-magic-numbers): named by its member
   std::size_t samples = 65536;  ///< of all other kinds together: a minute of legs and an IMU
 };
 

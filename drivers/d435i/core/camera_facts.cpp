@@ -133,7 +133,7 @@ Result<CameraFacts> read_facts(Transport& transport, const VideoMode& depth,
 }
 
 Calibration calibration_of(const CameraFacts& facts) {
-  const SE3 T_imu_depth = facts.imu.T_imu_depth.value_or(default_T_imu_depth());
+  const SE3 T_imu_depth = facts.imu.T_imu_depth.value_or(default_imu_pose());
   const SE3& T_cam_depth = facts.geometry.T_cam_depth;
   return {.camera = facts.geometry.color,
           .depth_unit_m = facts.geometry.depth_unit_m,

@@ -332,7 +332,7 @@ CameraIntrinsics color_intrinsics(const ColorTable& table, int width, int height
           .distortion = table.distortion};
 }
 
-SE3 default_T_imu_depth() {
+SE3 default_imu_pose() {
   // librealsense, src/ds/d400/ds-calib-parsers.cpp [m].
   const Vector3d p_imu_depth{-0.00552, 0.0051, 0.01174};
   return SE3{Eigen::Quaterniond::Identity(), p_imu_depth};

@@ -71,6 +71,6 @@ inline constexpr double kDefaultDepthUnit_m = 1e-3;
 [[nodiscard]] CameraIntrinsics color_intrinsics(const ColorTable& table, int width, int height);
 
 /// Where the IMU sits when no table says: T_imu_depth of the D435i's drawings.
-[[nodiscard]] SE3 default_T_imu_depth();
+[[nodiscard]] SE3 default_imu_pose();
 
 }  // namespace geoflow::drivers::d435i

@@ -30,7 +30,7 @@ template <typename Value>
   }
   const std::size_t count = std::min(text.size(), static_cast<std::size_t>(*size) - 1);
   auto* const target = static_cast<char*>(data);
-  std::copy_n(text.data(), count, target);
+  std::ranges::copy(text.substr(0, count), target);
   target[count] = '\0';
   *size = static_cast<int>(count + 1);
   return ONI_STATUS_OK;

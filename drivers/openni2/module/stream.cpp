@@ -39,6 +39,7 @@ using d435i::VideoStream;
 // more than a D435i measures. What is not below is no measurement: OpenNI's codec has no room for
 // it.
 constexpr int kLargestDepth_mm = 10'000;
+constexpr int kSmallestDepth_mm = 0;
 constexpr double kMillimetre_m = 1e-3;
 constexpr double kMicrosecondsPerSecond = 1e6;
 
@@ -113,7 +114,8 @@ OniStatus Stream::getProperty(int property, void* data, int* size) {
       return kind_ == VideoStream::kDepth ? give(kLargestDepth_mm, data, size)
                                           : ONI_STATUS_NOT_SUPPORTED;
     case ONI_STREAM_PROPERTY_MIN_VALUE:
-      return kind_ == VideoStream::kDepth ? give(int{0}, data, size) : ONI_STATUS_NOT_SUPPORTED;
+      return kind_ == VideoStream::kDepth ? give(kSmallestDepth_mm, data, size)
+                                          : ONI_STATUS_NOT_SUPPORTED;
     case ONI_STREAM_PROPERTY_STRIDE:
       return give(static_cast<int>(shape().row_bytes()), data, size);
     case ONI_STREAM_PROPERTY_MIRRORING:
@@ -287,7 +289,7 @@ Result<void> Stream::fill_depth(std::span<const std::byte> raw, std::span<std::b
     return fail(ErrorCode::kInvalidData, "{} bytes where a frame has {}", raw.size(),
                 target.size());
   }
-  if (state_.registered) {
+  if (registration_ && state_.registered) {
     if (auto done = registration_->run(raw, as_depth(target)); !done) {
       return done;
     }

@@ -149,9 +149,9 @@ class Walker {
 
   [[nodiscard]] Result<void> add_node(std::uint32_t id, FieldReader& fields) {
     (void)take_block(fields);  // its name
-    Node node{.id = id,
-              .kind = static_cast<NodeKind>(fields.take<std::uint32_t>()),
-              .codec = static_cast<Codec>(fields.take<std::uint32_t>())};
+    const Node node{.id = id,
+                    .kind = static_cast<NodeKind>(fields.take<std::uint32_t>()),
+                    .codec = static_cast<Codec>(fields.take<std::uint32_t>())};
     if (!fields.ok()) {
       return broken("a stream's description is cut off");
     }

@@ -32,7 +32,7 @@ class StartedPorts {
     return started;
   }
 
-  void stop() {
+  void stop() const {
     if (ports_.camera != nullptr) {
       ports_.camera->stop();
     }
