@@ -31,6 +31,10 @@ constexpr double kSupportThreshold = 0.17;
 /// How much of the range or the weight changes the odds by a factor of e.
 constexpr double kForceStep = 0.1;
 constexpr double kSupportStep = 0.06;
+/// A foot holds from half the load at which it is as likely to stand as not; a standing robot's
+/// four feet share the weight unevenly.
+constexpr double kGripOdds = 1.4;
+constexpr double kGripSlope = 2;
 /// Speeds of a foot along and across the ground (x, y, z): while it stands, creeping, rolling and
 /// giving way, and while it swings [m/s].
 constexpr std::array kStanceSpeed{0.1, 0.1, 0.05};
@@ -48,6 +52,10 @@ constexpr double kLift = 0.3;
 
 double bounded(double log_odds) {
   return std::clamp(log_odds, -kBound, kBound);
+}
+
+double probability_of(double log_odds) {
+  return 1 / (1 + std::exp(-log_odds));
 }
 
 /// log N(v; 0, S + stance^2) - log N(v; 0, S + swing^2), bounded.
@@ -93,23 +101,28 @@ void ContactEstimator::update_weight(
   weight_n_ = weight_n_ ? *weight_n_ + gain * (sum - *weight_n_) : sum;
 }
 
-double ContactEstimator::log_odds(std::size_t leg, const FootEvidence& evidence) const {
+void ContactEstimator::judge(std::size_t leg, const FootEvidence& evidence) {
   double sum = kinematic_log_odds(evidence.v_odom_mps, evidence.v_covariance);
   bool load_known = false;
+  FootState& foot = feet_.at(leg);
+  foot.grip = 1;
+  const auto add = [&](double log_odds) {
+    load_known = true;
+    sum += bounded(log_odds);
+    foot.grip = std::min(foot.grip, probability_of(kGripSlope * (log_odds + kGripOdds)));
+  };
   const std::optional<double> level =
       evidence.force ? ranges_.at(leg).level() : std::optional<double>{};
   if (level) {
-    load_known = true;
-    sum += bounded((*level - kForceThreshold) / kForceStep);
+    add((*level - kForceThreshold) / kForceStep);
   }
   if (evidence.support_n && weight_n_ && *weight_n_ > kLeastWeight) {
-    load_known = true;
-    sum += bounded((*evidence.support_n / *weight_n_ - kSupportThreshold) / kSupportStep);
+    add((*evidence.support_n / *weight_n_ - kSupportThreshold) / kSupportStep);
   }
   if (!load_known) {
     sum += std::clamp((kLowHeight - evidence.height_m) / kHeightStep, -kHeightBound, kHeightBound);
   }
-  return sum;
+  foot.probability = probability_of(sum);
 }
 
 const ContactEstimator::Feet& ContactEstimator::update(
@@ -129,7 +142,7 @@ const ContactEstimator::Feet& ContactEstimator::update(
     if (seen->force) {
       ranges_.at(leg).update(*seen->force, dt_s);
     }
-    foot.probability = 1 / (1 + std::exp(-log_odds(leg, *seen)));
+    judge(leg, *seen);
     const bool stood = foot.stands;
     foot.stands = foot.probability > (stood ? kLift : kTouch);
     foot.stance_s = foot.stands && stood ? foot.stance_s + dt_s : 0;

@@ -26,8 +26,11 @@ struct FootEvidence {
 struct FootState {
   double probability = 0;  ///< that it stands
   bool stands = false;     ///< the same with hysteresis: from 0.7 until 0.3
-  double stance_s = 0;     ///< since it stands [s]
-  double unheard_s = 0;    ///< since its encoders were heard [s]
+  /// How sure it is that the ground bears on it, by the least of what its sensor and its torques
+  /// say; 1 where neither tells. A foot that stands without a load may slide, or be about to lift.
+  double grip = 1;
+  double stance_s = 0;   ///< since it stands [s]
+  double unheard_s = 0;  ///< since its encoders were heard [s]
 };
 
 /// The range of a sensor whose zero and scale are unknown: extremes that widen at once and shrink
@@ -54,9 +57,11 @@ class ForceRange {
 ///   over a second (over whole steps the ground carries the body, whatever its mass);
 /// - kinematics: the likelihood ratio of the point's velocity over ground, that of a standing foot
 ///   against that of a swinging one.
-/// Where neither sensor nor torque tells who is loaded, the lowest feet are a little likelier to
-/// stand. It decides when the body's velocity has been lost, and only then.
-/// Thread-compatible; time comes with each call.
+/// The two about the load also say how sure it is that the foot holds (FootState::grip): sensors
+/// fall late, and a foot that lifts would pull the body back by what it moves until then. Where
+/// neither sensor nor torque tells who is loaded, the lowest feet are a little likelier to stand.
+/// It decides when the body's velocity has been lost, and only then. Thread-compatible; time comes
+/// with each call.
 class ContactEstimator {
  public:
   using Feet = std::array<FootState, kLegCount>;
@@ -71,7 +76,7 @@ class ContactEstimator {
  private:
   void update_weight(const std::array<std::optional<FootEvidence>, kLegCount>& evidence,
                      double dt_s);
-  [[nodiscard]] double log_odds(std::size_t leg, const FootEvidence& evidence) const;
+  void judge(std::size_t leg, const FootEvidence& evidence);
 
   std::array<ForceRange, kLegCount> ranges_;
   std::optional<double> weight_n_;

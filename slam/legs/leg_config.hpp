@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "geoflow/hal/calibration.hpp"
@@ -33,14 +34,20 @@ struct LegNoise {
   /// Error of lengths, radius and timing that does not average out, as a share of the way [1].
   double scale = 0.01;
 
-  /// Random walk of a foot's place after it has stood for `stance_s`, x, y and z [m/sqrt(s)].
-  [[nodiscard]] Vector3d creep_after(double stance_s) const noexcept {
-    const double settles = settling * std::exp(-stance_s / settling_s);
-    return {creep + settles, creep + settles, sinking + settles};
+  /// Random walk of a foot's place after it has stood for `stance_s`, while it is this sure that
+  /// the ground bears on it (FootState::grip), x, y and z [m/sqrt(s)].
+  [[nodiscard]] Vector3d creep_of(double stance_s, double grip) const noexcept {
+    const double slides = settling * loose(stance_s, grip);
+    return {creep + slides, creep + slides, sinking + slides};
   }
   /// Standard deviation of its speed then, independent from sample to sample [m/s].
-  [[nodiscard]] double speed_after(double stance_s) const noexcept {
-    return speed_mps + settling / std::sqrt(settling_s) * std::exp(-stance_s / settling_s);
+  [[nodiscard]] double speed_of(double stance_s, double grip) const noexcept {
+    return speed_mps + settling / std::sqrt(settling_s) * loose(stance_s, grip);
+  }
+
+  /// How much of its settling a foot does: all at touchdown, and without a load.
+  [[nodiscard]] double loose(double stance_s, double grip) const noexcept {
+    return std::max(std::exp(-stance_s / settling_s), 1 - grip);
   }
 };
 

@@ -230,15 +230,15 @@ void LegOdometry::take(const Timed<LegSample>& legs) {
   contact_.update(seen, dt);
   use_stance(found, turn, dt);
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
+    const FootState& state = contact_.feet().at(leg);
     double drag = 0;
     if (const std::optional<FootEvidence>& foot = seen.at(leg)) {
       drag = std::max(0.0, foot->v_odom_mps.norm() - std::sqrt(foot->v_covariance.trace()));
     }
     const double dragged = drag * drag * kDragMemory;
-    step_noise_.foothold.at(leg) =
-        (config_.noise.creep_after(contact_.feet().at(leg).stance_s).cwiseAbs2() +
-         Vector3d::Constant(dragged))
-            .cwiseSqrt();
+    step_noise_.foothold.at(leg) = (config_.noise.creep_of(state.stance_s, state.grip).cwiseAbs2() +
+                                    Vector3d::Constant(dragged))
+                                       .cwiseSqrt();
   }
   update_feet(found);
   rest(legs.t);

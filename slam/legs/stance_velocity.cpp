@@ -36,8 +36,9 @@ StanceVelocityEstimator::Votes StanceVelocityEstimator::votes(
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
     const std::optional<FootMotion>& motion = motions.at(leg);
     if (motion && feet.at(leg).stands) {
-      const Matrix3d S = motion->v_covariance +
-                         square(noise_.speed_after(feet.at(leg).stance_s)) * Matrix3d::Identity();
+      const Matrix3d S =
+          motion->v_covariance +
+          square(noise_.speed_of(feet.at(leg).stance_s, feet.at(leg).grip)) * Matrix3d::Identity();
       votes.at(leg) = {.v = motion->v_base,
                        .covariance = S,
                        .information = S.inverse(),

@@ -185,7 +185,9 @@ TEST_F(OpenNi2Module, RegistersDepthToColourWhereAsked) {
   const auto registered = next(depth_);
   ASSERT_TRUE(registered.isValid());
   ASSERT_EQ(device_.setImageRegistrationMode(openni::IMAGE_REGISTRATION_OFF), openni::STATUS_OK);
-  EXPECT_GT(std::abs(static_cast<double>(depth_.getHorizontalFieldOfView()) - 2 * std::atan(320 / 612.4)), 0.01);
+  EXPECT_GT(
+      std::abs(static_cast<double>(depth_.getHorizontalFieldOfView()) - 2 * std::atan(320 / 612.4)),
+      0.01);
   openni::VideoFrameRef raw;
   std::uint32_t number = kDepthPeriod;
   for (int i = 0; i < 3; ++i) {  // one that was under way may still be registered
