@@ -65,6 +65,17 @@ struct LegConfig {
   /// What a walking body's shocks and the mounting's vibration add to the accelerometer's noise
   /// density [m/s^2/sqrt(Hz)]. Source: Cerberus trusts it with 0.9 m/s^2 at 400 Hz.
   double shock_density = 0.045;
+  /// The same for the gyroscope's: shaken at touchdown, scale and sensitivity to acceleration. Of
+  /// simulated walks, with what a D435i's datasheet says of these [rad/s/sqrt(Hz)].
+  double shock_turn_density = 1e-3;
+
+  /// Noise densities of the IMU on a body that walks, units as in ImuNoise.
+  [[nodiscard]] double accel_density() const noexcept {
+    return std::hypot(imu_noise.accel_noise_density, shock_density);
+  }
+  [[nodiscard]] double gyro_density() const noexcept {
+    return std::hypot(imu_noise.gyro_noise_density, shock_turn_density);
+  }
 };
 
 // NOLINTEND(readability-magic-numbers)

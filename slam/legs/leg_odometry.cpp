@@ -75,8 +75,8 @@ LegOdometry::LegOdometry(const LegConfig& config, const BiasPrior& bias)
       stillness_{config.imu_noise},
       stance_estimator_{config.noise},
       preintegrator_{config} {
-  step_noise_.gyro = config.imu_noise.gyro_noise_density;
-  step_noise_.accel = std::hypot(config.imu_noise.accel_noise_density, config.shock_density);
+  step_noise_.gyro = config.gyro_density();
+  step_noise_.accel = config.accel_density();
   step_noise_.gyro_walk = config.imu_noise.gyro_random_walk;
   step_noise_.accel_walk = config.imu_noise.accel_random_walk;
 }
@@ -148,9 +148,8 @@ Matrix3d LegOdometry::odom_base_rotation() const {
 
 BaseTurn LegOdometry::turn_at(HostTime t) const {
   const Matrix3d R_base_imu = config_.T_base_imu.rotation_matrix();
-  const ImuNoise& noise = config_.imu_noise;
   return {.w_base_radps = R_base_imu * (imu_.at(t).gyro_radps - filter_.state().bias_gyro),
-          .sigma_radps = noise.gyro_noise_density * std::sqrt(noise.rate_hz),
+          .sigma_radps = config_.gyro_density() * std::sqrt(config_.imu_noise.rate_hz),
           .up_base = odom_base_rotation().transpose().col(2)};
 }
 

@@ -43,7 +43,7 @@ ReckonedMotion operator*(const ReckonedMotion& first, const ReckonedMotion& seco
 DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibration)
     : switches_{switches},
       T_base_cam_{calibration.T_base_cam.value_or(SE3{})},
-      imu_noise_{calibration.imu_noise},
+      gyro_density_{leg_config_of(calibration).gyro_density()},
       base_known_{calibration.T_base_cam.has_value()} {
   if (switches.imu && calibration.T_cam_imu) {
     odometry_.emplace(leg_config_of(calibration));
@@ -92,7 +92,7 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
   const double turned = T_base0_base1.log().head<3>().norm();
   constexpr double kGyroScale = 0.01;  // a MEMS gyroscope's scale error
   const double rotation =
-      squared(imu_noise_.gyro_noise_density) * dt + squared(kGyroScale * turned);
+      squared(gyro_density_) * dt + squared(kGyroScale * turned);
   Matrix6d covariance = Matrix6d::Zero();
   covariance.topLeftCorner<3, 3>() = rotation * Matrix3d::Identity();
   if (legs && !packet.legs.empty()) {

@@ -44,7 +44,7 @@ class DeadReckoner {
 
   Switches switches_;
   SE3 T_base_cam_;
-  ImuNoise imu_noise_;
+  double gyro_density_;  ///< LegConfig::gyro_density()
   bool base_known_;
   std::optional<LegOdometry> odometry_;
   std::optional<LegEstimate> last_;

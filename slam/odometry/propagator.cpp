@@ -163,7 +163,7 @@ class Propagator::Impl {
       const double dt = to_seconds(next.t - last.t);
       const Eigen::Quaterniond R_start_last = last.T_start_base.rotation();
       next.w_base = so3::log(R_start_last.conjugate() * next.T_start_base.rotation()) / dt;
-      next.turn_variance = last.turn_variance + squared(config_.imu_noise.gyro_noise_density) * dt;
+      next.turn_variance = last.turn_variance + squared(config_.gyro_density()) * dt;
     }
     history_.push_back(next);
   }

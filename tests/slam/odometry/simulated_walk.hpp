@@ -33,6 +33,8 @@ class SimulatedWalk {
     const SE3 T_base_cam = simulator::go2_T_base_cam();
     calibration.T_base_cam = T_base_cam;
     calibration.T_cam_imu = simulator::d435i_T_cam_imu();
+    calibration.imu_noise = options.noise;
+    calibration.imu_noise.rate_hz = options.rate_hz;
     const SE3 T_base_imu = T_base_cam * simulator::d435i_T_cam_imu();
     for (const auto& r : simulator::ImuSimulator{walk_, T_base_imu, seed, options}.readings()) {
       imu.push_back({walk_time(r.t_s), {}, r.sample});

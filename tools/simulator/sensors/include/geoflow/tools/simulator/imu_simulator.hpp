@@ -15,13 +15,15 @@
 namespace geoflow::simulator {
 
 /// The camera's IMU. Ranges and explanations are in imu_knobs(); all errors off: exact_imu().
-/// Sources of the defaults: the D435i's BMI055 (datasheet: range, resolution, zero offset,
-/// sensitivity to acceleration), and the shocks in a real Go1's body IMU.
+/// Sources of the defaults: the D435i's BMI055 (datasheet: range, resolution, noise of
+/// 150 ug/sqrt(Hz) and 0.014 degrees/s/sqrt(Hz), zero offset, sensitivity to acceleration), and the
+/// shocks in a real Go1's body IMU.
 struct ImuOptions {
   // NOLINTBEGIN(readability-magic-numbers): each default is named by its member, its unit by the
   // knob
   double rate_hz = 200;
-  ImuNoise noise{};  ///< densities at noise_scale 1; its rate is not used
+  /// Densities at noise_scale 1; its rate is not used.
+  ImuNoise noise{.accel_noise_density = 1.471e-3, .gyro_noise_density = 2.443e-4};
   double noise_scale = 1;
   double accel_bias_mps2 = 0.1;
   double gyro_bias_radps = 5e-3;
