@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -22,11 +23,30 @@ int foothold_block(Leg leg) {
   return foothold_block(static_cast<std::size_t>(leg));
 }
 
+/// The group's exponential of an error: a rotation, whose left Jacobian translations pass through.
+struct GroupStep {
+  explicit GroupStep(const Vector3d& phi) : rotation{so3::exp(phi)}, V{so3::right_jacobian(-phi)} {}
+
+  [[nodiscard]] Vector3d moved(const Vector3d& x, const Vector3d& delta) const {
+    return rotation * x + V * delta;
+  }
+
+  Eigen::Quaterniond rotation;
+  Matrix3d V;
+};
+
 }  // namespace
 
 void ContactFilter::reset(const LeggedState& state, const Covariance& covariance) {
   state_ = state;
   covariance_ = covariance;
+  state_.q_odom_begin = state_.q_odom_imu;
+  state_.p_odom_begin = state_.p_odom;
+  for (const auto& [to, from] : {std::pair{int{kBeginAttitude}, int{kAttitude}},
+                                 std::pair{int{kBeginPosition}, int{kPosition}}}) {
+    covariance_.middleRows<3>(to) = covariance_.middleRows<3>(from).eval();
+    covariance_.middleCols<3>(to) = covariance_.middleCols<3>(from).eval();
+  }
 }
 
 void ContactFilter::widen_velocity(double sigma_mps) {
@@ -138,22 +158,25 @@ double ContactFilter::correct(const Gain& H, const Vector3d& innovation, const M
   covariance_ -= K * covariance_z.transpose();
   covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 
-  const Vector3d phi = delta.segment<3>(kAttitude);
-  const Eigen::Quaterniond rotation = so3::exp(phi);
-  // The group's exponential: its translations pass through SO(3)'s left Jacobian.
-  const Matrix3d V = so3::right_jacobian(-phi);
-  const auto moved = [&](const Vector3d& x, int block) {
-    return Vector3d{rotation * x + V * delta.segment<3>(block)};
-  };
-  state_.q_odom_imu = (rotation * state_.q_odom_imu).normalized();
-  state_.v_odom = moved(state_.v_odom, kVelocity);
-  state_.p_odom = moved(state_.p_odom, kPosition);
+  const GroupStep now{delta.segment<3>(kAttitude)};
+  state_.q_odom_imu = (now.rotation * state_.q_odom_imu).normalized();
+  state_.v_odom = now.moved(state_.v_odom, delta.segment<3>(kVelocity));
+  state_.p_odom = now.moved(state_.p_odom, delta.segment<3>(kPosition));
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {
-    state_.footholds.at(leg) = moved(state_.footholds.at(leg), foothold_block(leg));
+    Vector3d& foothold = state_.footholds.at(leg);
+    foothold = now.moved(foothold, delta.segment<3>(foothold_block(leg)));
   }
+  const GroupStep begin{delta.segment<3>(kBeginAttitude)};
+  state_.q_odom_begin = (begin.rotation * state_.q_odom_begin).normalized();
+  state_.p_odom_begin = begin.moved(state_.p_odom_begin, delta.segment<3>(kBeginPosition));
   state_.bias_gyro += delta.segment<3>(kGyroBias);
   state_.bias_accel += delta.segment<3>(kAccelBias);
   return nis;
+}
+
+SE3 ContactFilter::way() const {
+  return SE3{state_.q_odom_begin, state_.p_odom_begin}.inverse() *
+         SE3{state_.q_odom_imu, state_.p_odom};
 }
 
 Matrix6d ContactFilter::pose_covariance() const {

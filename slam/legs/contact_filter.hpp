@@ -17,25 +17,34 @@ struct LeggedState {
   Vector3d p_odom = Vector3d::Zero();  ///< of the IMU [m]
   Vector3d bias_gyro = Vector3d::Zero();
   Vector3d bias_accel = Vector3d::Zero();
-  std::array<Vector3d, kLegCount> footholds{};  ///< in odom [m]; meaningless without contact
+  /// In odom [m]; of no meaning without contact.
+  std::array<Vector3d, kLegCount> footholds{Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(),
+                                            Vector3d::Zero()};
+  /// Where it was when it began, as it is known now.
+  Eigen::Quaterniond q_odom_begin = Eigen::Quaterniond::Identity();
+  Vector3d p_odom_begin = Vector3d::Zero();  ///< [m]
 };
 
 /// Contact-aided right-invariant extended Kalman filter of IMU and leg kinematics.
 /// Source: Hartley, Ghaffari, Eustice, Grizzle, "Contact-aided invariant extended Kalman filtering
 /// for robot state estimation", IJRR 2020. Differences: footholds are the centres of spherical feet
 /// and roll with a given displacement; each has its own process noise; all four have a fixed place
-/// in the state.
+/// in the state; so has a clone of the first pose (Roumeliotis and Burdick, "Stochastic cloning",
+/// ICRA 2002), from which the way since then is told: what is learnt of the tilt later turns both,
+/// and is no motion.
 ///
 /// The error of state X is X_true = exp(delta) X_estimated, in odom's axes: attitude, velocity,
-/// position, then biases (additive), then footholds. Yaw and position of the origin stay
-/// unobservable in this error whatever the estimate, which keeps the covariance consistent.
-/// odom's z points up. Thread-compatible.
+/// position, then biases (additive), then footholds, then the clone's attitude and position. Yaw
+/// and position of the origin stay unobservable in this error whatever the estimate, which keeps
+/// the covariance consistent. odom's z points up. Thread-compatible.
 class ContactFilter {
  public:
-  static constexpr int kErrorSize = 15 + 3 * static_cast<int>(kLegCount);
+  static constexpr int kErrorSize = 21 + 3 * static_cast<int>(kLegCount);
   /// Where the blocks of the error begin; the foothold of leg l begins at kFoothold + 3 l.
   enum Block { kAttitude = 0, kVelocity = 3, kPosition = 6, kGyroBias = 9, kAccelBias = 12 };
   static constexpr int kFoothold = 15;
+  static constexpr int kBeginAttitude = kFoothold + 3 * static_cast<int>(kLegCount);
+  static constexpr int kBeginPosition = kBeginAttitude + 3;
   using Covariance = Eigen::Matrix<double, kErrorSize, kErrorSize>;
 
   /// Continuous-time noise densities and the footholds' own motion over one step.
@@ -49,6 +58,7 @@ class ContactFilter {
                                              Vector3d::Zero()};
   };
 
+  /// The clone begins as the pose, whatever is given of it.
   void reset(const LeggedState& state, const Covariance& covariance);
 
   /// Adds an unknown velocity with this standard deviation [m/s].
@@ -80,6 +90,8 @@ class ContactFilter {
 
   /// Covariance of the pose T_odom_imu as hal/geometry.hpp defines it.
   [[nodiscard]] Matrix6d pose_covariance() const;
+  /// T_begin_imu, the IMU's motion since reset().
+  [[nodiscard]] SE3 way() const;
   /// Of the velocity in odom.
   [[nodiscard]] Matrix3d velocity_covariance() const;
 

@@ -343,6 +343,7 @@ LegEstimate LegOdometry::estimate(HostTime t) {
   LegEstimate estimate;
   estimate.t = t;
   estimate.T_odom_base = SE3{state.q_odom_imu, state.p_odom} * T_imu_base_;
+  estimate.T_start_base = config_.T_base_imu * filter_.way() * T_imu_base_;
   const Matrix6d adjoint = config_.T_base_imu.adjoint();
   estimate.covariance = adjoint * filter_.pose_covariance() * adjoint.transpose();
   const Vector3d way = config_.noise.scale * (estimate.T_odom_base.rotation().conjugate() *

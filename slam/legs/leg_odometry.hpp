@@ -45,8 +45,11 @@ struct MotionSamples {
 /// Where legs and IMU alone think the robot is.
 struct LegEstimate {
   HostTime t;
-  SE3 T_odom_base;  ///< odom: base at the start, levelled
-  /// Of the pose, as in hal/geometry.hpp, with the error that grows with the way (LegNoise::scale).
+  SE3 T_odom_base;  ///< odom: base at the start, levelled as is known by now
+  /// The way since the start. What is learnt of the tilt turns the start as well: it is no motion.
+  SE3 T_start_base;
+  /// Of T_odom_base, as in hal/geometry.hpp, with the error that grows with the way
+  /// (LegNoise::scale).
   Matrix6d covariance = Matrix6d::Zero();
   VelocityBelief velocity;
   ImuBias bias;

@@ -86,7 +86,7 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
     return std::nullopt;
   }
   const double dt = to_seconds(last_->t - before->t);
-  const SE3 T_base0_base1 = before->T_odom_base.inverse() * last_->T_odom_base;
+  const SE3 T_base0_base1 = before->T_start_base.inverse() * last_->T_start_base;
   // Where measurements contradict the prediction, all of it is to be believed less.
   const double doubt = std::max(1.0, last_->health.nis);
   const double turned = T_base0_base1.log().head<3>().norm();

@@ -156,8 +156,8 @@ class Propagator::Impl {
   }
 
   void remember(const LegEstimate& estimate) {
-    const SE3& T_start_base = estimate.T_odom_base;  // frames: its odom is where it started
-    Reckoned next{.t = estimate.t, .T_start_base = T_start_base, .velocity = estimate.velocity};
+    Reckoned next{
+        .t = estimate.t, .T_start_base = estimate.T_start_base, .velocity = estimate.velocity};
     if (!history_.empty()) {
       const Reckoned& last = history_.back();
       const double dt = to_seconds(next.t - last.t);

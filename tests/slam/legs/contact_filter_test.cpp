@@ -64,6 +64,9 @@ Error error_of(const LeggedState& truth, const LeggedState& state) {
   }
   delta.segment<3>(ContactFilter::kGyroBias) = truth.bias_gyro - state.bias_gyro;
   delta.segment<3>(ContactFilter::kAccelBias) = truth.bias_accel - state.bias_accel;
+  const Eigen::Quaterniond begin = truth.q_odom_begin * state.q_odom_begin.conjugate();
+  delta.segment<3>(ContactFilter::kBeginAttitude) = so3::log(begin);
+  delta.segment<3>(ContactFilter::kBeginPosition) = truth.p_odom_begin - begin * state.p_odom_begin;
   return delta;
 }
 
@@ -77,7 +80,7 @@ TEST(ContactFilter, CovarianceFollowsTheMotion) {
     const LeggedState state = random_state(random);
     const ImuSample imu{.accel_mps2 = random_vector(random, 12),
                         .gyro_radps = random_vector(random, 2)};
-    for (int axis = 0; axis < ContactFilter::kErrorSize; ++axis) {
+    for (int axis = 0; axis < ContactFilter::kBeginAttitude; ++axis) {
       const Error delta = kSmall * Error::Unit(axis);
       ContactFilter filter;
       filter.reset(state, delta * delta.transpose());
@@ -138,6 +141,28 @@ TEST(ContactFilter, AKnownFootholdCorrectsThePosition) {
       SE3{filter.state().q_odom_imu, filter.state().p_odom} * (foot_in_imu + back);
   EXPECT_LT((foot_now - filter.state().footholds[1]).norm(), 1e-4);
   EXPECT_GT((filter.state().p_odom - before).norm(), 1e-3);
+}
+
+/// The specific force of a robot at rest tells its tilt by and by: all poses turn by that, and the
+/// way between them stays as it was.
+TEST(ContactFilter, WhatIsLearntOfTheTiltIsNoMotion) {
+  constexpr double kTilt = 0.03;
+  const Vector3d at_rest{0, 0, 9.80665};
+  LeggedState state;
+  state.q_odom_imu = so3::exp({kTilt, 0, 0});
+  ContactFilter::Covariance P = 1e-8 * ContactFilter::Covariance::Identity();
+  P.block<3, 3>(ContactFilter::kAttitude, ContactFilter::kAttitude) = 1e-3 * Matrix3d::Identity();
+  ContactFilter filter;
+  filter.reset(state, P);
+  constexpr double kStep = 5e-3;
+  for (int step = 0; step < 200; ++step) {
+    filter.propagate({.accel_mps2 = at_rest, .gyro_radps = Vector3d::Zero()}, kStep,
+                     {.gyro = 1e-4, .accel = 1e-2});
+    filter.update_velocity(Vector3d::Zero(), 1e-6 * Matrix3d::Identity(), kInfinity);
+  }
+  EXPECT_LT(so3::log(filter.state().q_odom_imu).norm(), kTilt / 20);
+  EXPECT_LT(so3::log(filter.way().rotation()).norm(), kTilt / 100);
+  EXPECT_LT(filter.way().translation().norm(), 1e-3);
 }
 
 TEST(ContactFilter, RefusesWhatContradictsItAndNotANumber) {

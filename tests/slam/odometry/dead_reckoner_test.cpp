@@ -93,9 +93,10 @@ TEST(DeadReckoner, KnowsEachStepOfAWalkByImuAndLegsAndHowWell) {
     EXPECT_GT(account.by_legs, 500);
     EXPECT_GT(account.nees_rotation, 0.2) << "seed " << seed;
     EXPECT_LT(account.nees_rotation, 2) << "seed " << seed;
-    EXPECT_GT(account.nees_translation, 0.2) << "seed " << seed;
+    // A simulated foot slides less than what a real one is trusted with (LegNoise::settling).
+    EXPECT_GT(account.nees_translation, 0.02) << "seed " << seed;
     EXPECT_LT(account.nees_translation, 2) << "seed " << seed;
-    EXPECT_LT(account.worst_m, 0.01) << "seed " << seed;
+    EXPECT_LT(account.worst_m, 0.002) << "seed " << seed;
   }
 }
 

@@ -52,7 +52,7 @@ double scale_error(const SimulatedWalk& walk) {
       continue;
     }
     if (begin) {
-      const Vector3d found = (begin->T_odom_base.inverse() * estimate->T_odom_base).translation();
+      const Vector3d found = (begin->T_start_base.inverse() * estimate->T_start_base).translation();
       const Vector3d truth =
           (walk.T_world_base(begin_s).inverse() * walk.T_world_base(t_s)).translation();
       const double length = truth.head<2>().norm();
