@@ -64,8 +64,8 @@ class GeoflowdService : public testing::Test {
                           control_.string()},
                          options));
   }
-  [[nodiscard]] Words replay() const {
-    tests::write_synthetic_recording(recording_, {});
+  [[nodiscard]] Words replay(const tests::SyntheticRecording& recording = {}) const {
+    tests::write_synthetic_recording(recording_, recording);
     return {"--replay", recording_.string(), "--loop"};
   }
   static Words absent_camera() {
@@ -183,9 +183,8 @@ pid_t find_thread(pid_t process, const std::string& name) {
   return 0;
 }
 
-/// Stops one thread of a process, as a debugger does, and leaves the others. The threads of a
-/// looping replay do not live long: one that ends meanwhile is looked for again. 0, with errno,
-/// where that is not allowed.
+/// Stops one thread of a process, as a debugger does, and leaves the others. 0, with errno, where
+/// that is not allowed.
 pid_t stop_thread(pid_t process, const std::string& name) {
   const HostTime deadline = HostClock::now() + seconds{60};
   while (HostClock::now() < deadline) {
@@ -206,7 +205,10 @@ pid_t stop_thread(pid_t process, const std::string& name) {
 class StuckThread : public GeoflowdService, public testing::WithParamInterface<const char*> {};
 
 TEST_P(StuckThread, StarvesTheWatchdogUntilItMovesAgain) {
-  const Process process{daemon({"WATCHDOG_USEC=1000000"}, replay()), log("daemon")};
+  // A minute, in which no thread ends and gives way to the next round's.
+  const Process process{
+      daemon({"WATCHDOG_USEC=1000000"}, replay({.frames = 240, .rate_hz = 4, .shift_px = 1})),
+      log("daemon")};
   ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
   ASSERT_TRUE(manager_.wait_for("WATCHDOG=1"));
   const pid_t thread = stop_thread(process.pid(), GetParam());

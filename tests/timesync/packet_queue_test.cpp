@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kImuMs = 5;
 constexpr double kLegsMs = 2;
-constexpr std::size_t kPlenty = 4096;
+constexpr std::size_t kPlenty = 16384;  // more than any walk here has samples of a kind
 
 SynchroniserStreams all_streams() {
   return {.camera = {}, .imu = StampInfo{}, .legs = StampInfo{}};
