@@ -40,6 +40,9 @@ struct MapPoint {
   std::uint32_t found = 0;                ///< of those, frames in which it agreed with the pose
 };
 
+/// Whether an edge ties neighbours on one way, or a place to itself as it was seen again.
+enum class EdgeKind : std::uint8_t { kWay, kLoop };
+
 /// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); from
 /// IMU and legs in between; or from both views, where a loop closes.
 struct RelativeEdge {
@@ -47,6 +50,7 @@ struct RelativeEdge {
   KeyframeId to{};
   SE3 T_from_to;
   Matrix6d information = Matrix6d::Zero();  ///< of a right perturbation of T_from_to
+  EdgeKind kind = EdgeKind::kWay;
 };
 
 /// A frame that was kept.

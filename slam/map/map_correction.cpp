@@ -1,7 +1,6 @@
 #include "map/map_correction.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -15,9 +14,6 @@
 
 namespace geoflow::slam {
 namespace {
-
-/// Edges between keyframes nearer in time than this say nothing that the way between does not.
-constexpr std::uint32_t kLoop = 20;
 
 /// What odometry leaves of a step between keyframes: standard deviations, of the step and at least.
 constexpr double kOfTheWay = 0.01;
@@ -64,7 +60,7 @@ PoseGraphProblem pose_graph(const Map& map) {
   std::ranges::copy_if(map.joins(), std::back_inserter(problem.way),
                        [&](const RelativeEdge& join) { return inside(join.to); });
   for (const RelativeEdge& edge : map.edges()) {
-    if (inside(edge.to) && ids_apart(edge.from, edge.to) > kLoop) {
+    if (inside(edge.to) && edge.kind == EdgeKind::kLoop) {
       problem.loops.push_back(edge);
     }
   }

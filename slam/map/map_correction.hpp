@@ -15,8 +15,9 @@ namespace geoflow::slam {
 [[nodiscard]] bool moves_map(const Map& map, const RelativeEdge& loop);
 
 /// All keyframes of the newest part; between consecutive ones their present relative pose, as
-/// uncertain as odometry leaves it; what joined earlier parts to it; and the edges between
-/// keyframes that are far apart in time.
+/// uncertain as odometry leaves it; what joined earlier parts to it; and the loops. Not the way's
+/// other edges: bundle adjustment has weighed them already, against points that the graph does not
+/// know.
 [[nodiscard]] PoseGraphProblem pose_graph(const Map& map);
 
 /// Takes over a pose graph's solution: keyframes get their new poses, those made since move along

@@ -70,6 +70,8 @@ constexpr double kDriftM = 0.3;
 constexpr double kDriftMPerM = 0.05;
 constexpr double kDriftRad = 0.15;
 constexpr double kDriftRadPerM = 0.02;
+/// What it usually does.
+constexpr double kWayMPerM = 0.01;
 
 /// What calibration and the sensor's own distortion leave of the pose between two views, however
 /// many points and surfaces agree.
@@ -124,7 +126,8 @@ class Verifier {
         .edge = {.from = old.id,
                  .to = problem_.newest.id,
                  .T_from_to = T_old_new1,
-                 .information = inverse(solution.covariance + of_two_views())},
+                 .information = inverse(solution.covariance + of_two_views()),
+                 .kind = EdgeKind::kLoop},
         .certain = depth && solution.visual_inliers >= kInliersBeyondDoubt &&
                    agrees(old, T_old_new1, kSeenBeyondDoubt, kAgreeingBeyondDoubt)};
   }
@@ -292,6 +295,16 @@ bool is_possible(const Map& map, const RelativeEdge& loop) {
          drift.head<3>().norm() < kDriftRad + kDriftRadPerM * way_m;
 }
 
+/// Whether a loop tells more than the way between its keyframes does.
+bool is_news(const Map& map, const RelativeEdge& loop) {
+  if (!map.same_part(loop.from, loop.to)) {
+    return true;
+  }
+  const double way_m = way_between(map, loop.from, loop.to);
+  const Matrix6d covariance = inverse(loop.information);
+  return covariance.diagonal().tail<3>().maxCoeff() < kWayMPerM * kWayMPerM * way_m * way_m;
+}
+
 /// Whether two loops put the later's new keyframe at one place, by the way between them.
 bool say_the_same(const Map& map, const RelativeEdge& a, const RelativeEdge& b) {
   if (!map.same_part(a.from, b.from) || !map.same_part(a.to, b.to)) {
@@ -342,7 +355,7 @@ std::shared_ptr<const LoopProblem> LoopCloser::problem(const Map& map, KeyframeI
 std::vector<RelativeEdge> LoopCloser::consider(const Map& map, const LoopSolution& solution) {
   std::vector<RelativeEdge> believed;
   for (const LoopHypothesis& found : solution.found) {
-    if (!is_possible(map, found.edge)) {
+    if (!is_possible(map, found.edge) || !is_news(map, found.edge)) {
       continue;
     }
     std::erase_if(waiting_, [&](const LoopHypothesis& other) {

@@ -31,7 +31,7 @@ constexpr std::size_t kMatrixBytes = 36 * sizeof(double);
 constexpr std::size_t kKeyframeBytes = 20 + kPoseBytes + kMatrixBytes;
 constexpr std::size_t kPointBytes = 3 * sizeof(double) + sizeof(Descriptor) + 16;
 constexpr std::size_t kObservationBytes = 4 + 3 * sizeof(double);
-constexpr std::size_t kEdgeBytes = 8 + kPoseBytes + kMatrixBytes;
+constexpr std::size_t kEdgeBytes = 12 + kPoseBytes + kMatrixBytes;
 constexpr std::size_t kFeatureBytes = 5 * sizeof(double) + sizeof(Descriptor);
 constexpr std::size_t kSurfelBytes = 4 + 8 * sizeof(float);
 
@@ -277,6 +277,7 @@ std::vector<std::byte> encode(const std::vector<RelativeEdge>& edges) {
     writer.put(static_cast<std::uint32_t>(edge.to));
     writer.put(edge.T_from_to);
     writer.put(edge.information);
+    writer.put(static_cast<std::uint32_t>(edge.kind));
   }
   return writer.take();
 }
@@ -290,6 +291,7 @@ std::vector<RelativeEdge> decode_edges(ByteReader& reader,
     edge.to = keyframe_id(reader, keyframes);
     edge.T_from_to = reader.pose();
     edge.information = positive(reader);
+    edge.kind = one_of(reader, EdgeKind::kLoop);
     if (edge.from == edge.to ||
         (reader.ok() && keyframes.at(edge.from).part != keyframes.at(edge.to).part)) {
       reader.fail("an edge between keyframes that it cannot tie");

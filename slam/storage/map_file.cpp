@@ -32,7 +32,7 @@ namespace geoflow::slam {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x50414D574F4C4647;  // "GFLOWMAP"
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = 40;
 constexpr std::size_t kEntryBytes = 28;
 constexpr mode_t kMode = 0644;
