@@ -91,8 +91,7 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
   const double doubt = std::max(1.0, last_->health.nis);
   const double turned = T_base0_base1.log().head<3>().norm();
   constexpr double kGyroScale = 0.01;  // a MEMS gyroscope's scale error
-  const double rotation =
-      squared(gyro_density_) * dt + squared(kGyroScale * turned);
+  const double rotation = squared(gyro_density_) * dt + squared(kGyroScale * turned);
   Matrix6d covariance = Matrix6d::Zero();
   covariance.topLeftCorner<3, 3>() = rotation * Matrix3d::Identity();
   if (legs && !packet.legs.empty()) {
