@@ -172,6 +172,7 @@ void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
 
 void bind_map(MapConfig& c, std::vector<Key>& keys) {
   keys.push_back({"map.file", &c.file});
+  keys.push_back({"map.save_interval_s", &c.save_interval, 0, 86400});
 }
 
 }  // namespace

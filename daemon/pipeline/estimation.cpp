@@ -14,7 +14,9 @@ namespace geoflow::daemon {
 
 PoseEstimate process_packet(Run& run, const SyncedPacket& packet) {
   const HostTime begin = HostClock::now();
-  const PoseEstimate estimate = run.core->process(packet);
+  PoseEstimate estimate = run.core->process(packet);
+  estimate.reset_counter += run.earlier_resets;
+  run.resets = estimate.reset_counter;
   run.statistics->process.add(HostClock::now() - begin);
   run.statistics->counters.by_status.at(static_cast<std::size_t>(estimate.status))
       .fetch_add(1, std::memory_order_relaxed);

@@ -58,11 +58,12 @@ class DirectReceiver final : public SampleReceiver {
 }  // namespace
 
 LockStepRunner::LockStepRunner(Run& run, const Config& config, EstimateHandler handler,
-                               PropagatedHandler on_propagated)
+                               PropagatedHandler on_propagated, BetweenFrames between_frames)
     : run_{run},
       config_{config},
       handler_{std::move(handler)},
-      on_propagated_{std::move(on_propagated)} {}
+      on_propagated_{std::move(on_propagated)},
+      between_frames_{std::move(between_frames)} {}
 
 Result<void> LockStepRunner::run(const std::stop_token& stop) {
   timesync::Synchroniser synchroniser{config_.synchroniser, synchroniser_streams(run_)};
@@ -100,6 +101,9 @@ Result<void> LockStepRunner::run(const std::stop_token& stop) {
 PoseEstimate LockStepRunner::estimate(const SyncedPacket& packet) {
   RunCounters& counters = run_.statistics->counters;
   counters.packets.fetch_add(1, std::memory_order_relaxed);
+  if (between_frames_) {
+    (void)between_frames_();  // every mapping task has been applied
+  }
   const PoseEstimate estimate = process_packet(run_, packet);
   handler_(packet, estimate);
   if (const auto task = run_.core->take_mapping_task()) {

@@ -77,6 +77,7 @@ class Pipeline::Implementation {
       : run_{run},
         on_estimate_{std::move(handlers.on_estimate)},
         on_end_{std::move(handlers.on_end)},
+        between_frames_{std::move(handlers.between_frames)},
         bells_{std::move(bells)},
         queues_{config.pipeline, run.statistics->counters, bells_.sync},
         synchroniser_{config.synchroniser, synchroniser_streams(run)},
@@ -112,6 +113,8 @@ class Pipeline::Implementation {
     ports_.stop();
     run_.synchroniser = synchroniser_.counters();
   }
+
+  void wake() noexcept { bells_.slam.ring(); }
 
   [[nodiscard]] std::vector<ThreadActivity> threads() const {
     ThreadActivity source = run_.activity();
@@ -202,6 +205,9 @@ class Pipeline::Implementation {
     bool stopped = false;
     while (!done && !stopped) {
       done = packets_done_.load(std::memory_order_acquire);
+      if (between_frames_ && between_frames_()) {
+        result_is_stale_ = mapping_;
+      }
       if (const auto packet = packets_.try_pop()) {
         done = false;
         estimate(*packet);
@@ -235,8 +241,10 @@ class Pipeline::Implementation {
 
   void take_over_mapping() {
     if (const auto result = results_.try_pop()) {
-      run_.core->apply(*result);
-      run_.statistics->counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
+      if (!std::exchange(result_is_stale_, false)) {
+        run_.core->apply(*result);
+        run_.statistics->counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
+      }
       mapping_ = false;
     }
   }
@@ -269,6 +277,7 @@ class Pipeline::Implementation {
   Run& run_;
   EstimateHandler on_estimate_;
   std::function<void()> on_end_;
+  BetweenFrames between_frames_;
   Bells bells_;
   Pulses pulses_;
   SampleQueues queues_;
@@ -280,7 +289,8 @@ class Pipeline::Implementation {
   timesync::SpscRing<slam::MappingResult> results_{1};  // map -> slam
   std::atomic<bool> source_done_{false};
   std::atomic<bool> packets_done_{false};
-  bool mapping_ = false;  // slam: a task is with map
+  bool mapping_ = false;          // slam: a task is with map
+  bool result_is_stale_ = false;  // slam: it is a former estimator's
   StartedPorts ports_;
   std::jthread map_;
   std::jthread slam_;
@@ -310,6 +320,10 @@ Result<std::unique_ptr<Pipeline>> Pipeline::start(Run& run, const Config& config
 
 std::vector<ThreadActivity> Pipeline::threads() const {
   return implementation_->threads();
+}
+
+void Pipeline::wake() noexcept {
+  implementation_->wake();
 }
 
 void Pipeline::stop() {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -67,27 +69,38 @@ Result<WatchRequest> parse_watch(const json& object) {
   return WatchRequest{.rate_hz = rate_hz};
 }
 
-Result<ControlRequest> parse_command(const json& object, const std::string& name) {
-  ControlRequest request{.command = HelpRequest{}, .name = name, .id = {}};
+Result<Change> parse_map(const json& object) {
+  const auto what = object.find("do");
+  if (what != object.end() && *what == "save") {
+    return Change::kSaveMap;
+  }
+  if (what != object.end() && *what == "reset") {
+    return Change::kResetMap;
+  }
+  return fail(ErrorCode::kInvalidArgument, "do: must be \"save\" or \"reset\"");
+}
+
+using Command = decltype(ControlRequest::command);
+
+Result<Command> parse_command(const json& object, const std::string& name) {
+  const auto as_command = [](auto parsed) { return Command{parsed}; };
   if (name == "watch") {
-    const auto watch = parse_watch(object);
-    if (!watch) {
-      return tl::unexpected{watch.error()};
-    }
-    request.command = *watch;
-  } else if (name == "status") {
-    request.command = StatusRequest{};
-  } else if (name == "unwatch") {
-    request.command = UnwatchRequest{};
-  } else if (name != "help") {
-    return fail(ErrorCode::kInvalidArgument, "cmd: must be one of help, status, watch, unwatch");
+    return only_keys(object, {"stream", "rate_hz"}).and_then([&] {
+      return parse_watch(object).map(as_command);
+    });
   }
-  const auto checked =
-      name == "watch" ? only_keys(object, {"stream", "rate_hz"}) : only_keys(object, {});
-  if (!checked) {
-    return tl::unexpected{checked.error()};
+  if (name == "map") {
+    return only_keys(object, {"do"}).and_then([&] { return parse_map(object).map(as_command); });
   }
-  return request;
+  static const std::map<std::string, Command, std::less<>> plain = {
+      {"help", HelpRequest{}},     {"status", StatusRequest{}}, {"unwatch", UnwatchRequest{}},
+      {"config", ConfigRequest{}}, {"reset", Change::kReset},   {"reload", Change::kReload}};
+  const auto found = plain.find(name);
+  if (found == plain.end()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "cmd: must be one of help, status, watch, unwatch, config, map, reset, reload");
+  }
+  return only_keys(object, {}).map([&] { return found->second; });
 }
 
 }  // namespace
@@ -105,9 +118,10 @@ Result<ControlRequest> parse_control_request(std::string_view line) {
   if (id != object->end() && !id->is_string() && !id->is_number_integer()) {
     return fail(ErrorCode::kInvalidArgument, "id: must be a string or a whole number");
   }
-  return parse_command(*object, cmd->get<std::string>()).map([&](ControlRequest request) {
-    request.id = id == object->end() ? json{} : *id;
-    return request;
+  auto name = cmd->get<std::string>();
+  return parse_command(*object, name).map([&](const Command& command) {
+    return ControlRequest{
+        .command = command, .name = name, .id = id == object->end() ? json{} : *id};
   });
 }
 

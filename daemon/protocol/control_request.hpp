@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,8 +20,19 @@ struct WatchRequest {
   double rate_hz = 0;  ///< poses a second at most; 0: every one
 };
 
+struct ConfigRequest {};
+
+/// What changes something: only for whom Authority permits it.
+enum class Change : std::uint8_t {
+  kSaveMap,
+  kResetMap,  ///< begin with an empty map
+  kReset,     ///< begin anew in the map as it is
+  kReload,    ///< read the configuration again
+};
+
 struct ControlRequest {
-  std::variant<StatusRequest, HelpRequest, UnwatchRequest, WatchRequest> command;
+  std::variant<StatusRequest, HelpRequest, UnwatchRequest, WatchRequest, ConfigRequest, Change>
+      command;
   std::string name;   ///< the command's word
   nlohmann::json id;  ///< echoed in the reply; null where the client gave none
 };

@@ -1,13 +1,16 @@
 #include "server/acceptor.hpp"
 
 #include <cerrno>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
+#include <sys/types.h>
 #include <tl/expected.hpp>
 #include <unistd.h>
 
@@ -28,12 +31,31 @@ UniqueFd open_spare() {
   return UniqueFd{::open("/dev/null", O_RDONLY | O_CLOEXEC)};
 }
 
+std::vector<gid_t> peer_groups(int fd) {
+  constexpr std::size_t kMostGroups = 65536;  // NGROUPS_MAX of Linux
+  std::vector<gid_t> groups(16);
+  auto size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  while (::getsockopt(fd, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0) {
+    if (errno != ERANGE || groups.size() >= kMostGroups) {
+      return {};
+    }
+    groups.resize(size / sizeof(gid_t));
+  }
+  groups.resize(size / sizeof(gid_t));
+  return groups;
+}
+
 Connection describe(UniqueFd fd) {
   ::setsockopt(fd.get(), SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
   ucred credentials{};
   socklen_t size = sizeof credentials;
   ::getsockopt(fd.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size);
-  return {.fd = std::move(fd), .pid = credentials.pid, .uid = credentials.uid};
+  auto groups = peer_groups(fd.get());
+  return {.fd = std::move(fd),
+          .pid = credentials.pid,
+          .uid = credentials.uid,
+          .gid = credentials.gid,
+          .groups = std::move(groups)};
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include <sys/types.h>
 
@@ -13,11 +14,13 @@
 
 namespace geoflow::daemon {
 
-/// A connection just accepted and whose it is (SO_PEERCRED).
+/// A connection just accepted and whose it is, as the kernel knows (SO_PEERCRED, SO_PEERGROUPS).
 struct Connection {
   UniqueFd fd;
   pid_t pid = 0;
   uid_t uid = 0;
+  gid_t gid = 0;
+  std::vector<gid_t> groups{};  ///< supplementary ones
 };
 
 /// Accepts on one listening socket: nonblocking connections with small send buffers, so that a

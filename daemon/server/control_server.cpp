@@ -21,6 +21,7 @@
 #include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
+#include "server/authority.hpp"
 #include "server/control_connection.hpp"
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
@@ -36,9 +37,12 @@ nlohmann::json greeting() {
 
 }  // namespace
 
-ControlServer::ControlServer(EventLoop& loop, const SocketConfig& config,
-                             ControlConnection::StatusProvider status)
-    : loop_{loop}, config_{config}, status_{std::move(status)} {}
+ControlServer::ControlServer(EventLoop& loop, const SocketConfig& config, ControlHandlers handlers,
+                             Authority authority)
+    : loop_{loop},
+      config_{config},
+      handlers_{std::move(handlers)},
+      authority_{std::move(authority)} {}
 
 ControlServer::~ControlServer() {
   while (!clients_.empty()) {
@@ -46,9 +50,14 @@ ControlServer::~ControlServer() {
   }
 }
 
-Result<std::unique_ptr<ControlServer>> ControlServer::create(
-    EventLoop& loop, const SocketConfig& config, ControlConnection::StatusProvider status,
-    UniqueFd given) {
+Result<std::unique_ptr<ControlServer>> ControlServer::create(EventLoop& loop,
+                                                             const SocketConfig& config,
+                                                             ControlHandlers handlers,
+                                                             UniqueFd given) {
+  auto authority = Authority::create(config.group);
+  if (!authority) {
+    return tl::unexpected{std::move(authority.error())};
+  }
   auto socket = ListeningSocket::open_unless_given(
       {.path = config.control, .type = SOCK_STREAM, .mode = config.mode, .group = config.group},
       std::move(given));
@@ -56,7 +65,8 @@ Result<std::unique_ptr<ControlServer>> ControlServer::create(
     return tl::unexpected{std::move(socket.error())};
   }
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
-  std::unique_ptr<ControlServer> server{new ControlServer{loop, config, std::move(status)}};
+  std::unique_ptr<ControlServer> server{
+      new ControlServer{loop, config, std::move(handlers), std::move(*authority)}};
   auto acceptor = Acceptor::create(
       loop, std::move(*socket),
       [self = server.get()](Connection connection) { self->on_connection(std::move(connection)); });
@@ -70,7 +80,7 @@ Result<std::unique_ptr<ControlServer>> ControlServer::create(
 void ControlServer::on_connection(Connection connection) {
   const int fd = connection.fd.get();
   const HostTime now = HostClock::now();
-  auto client = std::make_unique<ControlConnection>(std::move(connection), now);
+  auto client = std::make_unique<ControlConnection>(std::move(connection), next_number_++, now);
   if (clients_.size() >= static_cast<std::size_t>(config_.clients)) {
     client->say(
         {{"ok", false}, {"error", {{"code", "unavailable"}, {"message", "too many clients"}}}},
@@ -91,7 +101,7 @@ void ControlServer::on_ready(int fd, std::uint32_t events) {
   bool alive = (events & EPOLLOUT) == 0 || client.flush(now);
   // One who does not read his replies is not listened to either.
   if (alive && !client.blocked() && (events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) {
-    alive = client.receive(status_, now);
+    alive = client.receive(handlers_, authority_, now);
   }
   if (!alive) {
     close(fd);
@@ -122,6 +132,20 @@ void ControlServer::publish(const geoflow_pose& pose) {
   for (const int fd : lost) {
     close(fd);
   }
+}
+
+void ControlServer::conclude(const Asker& asker, const Result<nlohmann::json>& outcome) {
+  for (const auto& [fd, client] : clients_) {
+    if (client->number() == asker.client) {
+      client->conclude(asker, outcome, HostClock::now());
+      loop_.modify(fd, EPOLLOUT);  // sent from there: it may be its own request that is answered
+    }
+  }
+}
+
+void ControlServer::set_limits(const SocketConfig& config) {
+  config_.clients = config.clients;
+  config_.stall_timeout = config.stall_timeout;
 }
 
 void ControlServer::check_timeouts() {

@@ -12,7 +12,6 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <grp.h>
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -23,6 +22,8 @@
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
+
+#include "server/authority.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -109,15 +110,12 @@ Result<void> set_group(const std::filesystem::path& path, const std::string& gro
   if (group.empty()) {
     return {};
   }
-  const struct group* entry =
-      ::getgrnam(group.c_str());  // NOLINT(concurrency-mt-unsafe): before any thread starts
-  if (entry == nullptr) {
-    return fail(ErrorCode::kInvalidArgument, "socket.group: no group is named {}", group);
-  }
-  if (::chown(path.c_str(), static_cast<uid_t>(-1), entry->gr_gid) != 0) {
-    return fail_errno(fmt::format("{}: group {}", path.string(), group));
-  }
-  return {};
+  return find_group(group).and_then([&](gid_t number) -> Result<void> {
+    if (::chown(path.c_str(), static_cast<uid_t>(-1), number) != 0) {
+      return fail_errno(fmt::format("{}: group {}", path.string(), group));
+    }
+    return {};
+  });
 }
 
 /// Binds, sets owner and permissions, and only then listens: nobody connects under the wrong ones.

@@ -50,6 +50,12 @@ void read_boot_id(std::span<std::uint8_t> id) {
   }
 }
 
+void write_limits(const SocketConfig& config, geoflow_welcome& welcome) {
+  welcome.max_clients = static_cast<std::uint32_t>(config.clients);
+  welcome.stall_timeout_ms = static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(config.stall_timeout).count());
+}
+
 geoflow_welcome make_welcome(const SocketConfig& config, std::uint32_t clock_flags) {
   geoflow_welcome welcome{};
   welcome.major = GEOFLOW_PROTOCOL_MAJOR;
@@ -59,10 +65,8 @@ geoflow_welcome make_welcome(const SocketConfig& config, std::uint32_t clock_fla
   }
   read_boot_id(welcome.boot_id);
   welcome.clock_flags = clock_flags;
-  welcome.max_clients = static_cast<std::uint32_t>(config.clients);
   welcome.max_request_bytes = GEOFLOW_MAX_RECORD;
-  welcome.stall_timeout_ms = static_cast<std::uint32_t>(
-      std::chrono::duration_cast<std::chrono::milliseconds>(config.stall_timeout).count());
+  write_limits(config, welcome);
   copy_text(welcome.version, version());
   return welcome;
 }
@@ -183,6 +187,13 @@ void PoseServer::finish(geoflow_end_reason reason) {
   for (const int fd : done) {
     close(fd, {});
   }
+}
+
+void PoseServer::set_limits(const SocketConfig& config) {
+  config_.clients = config.clients;
+  config_.handshake_timeout = config.handshake_timeout;
+  config_.stall_timeout = config.stall_timeout;
+  write_limits(config_, welcome_);
 }
 
 void PoseServer::check_timeouts() {

@@ -34,6 +34,10 @@ void notify_status(const std::string& status) {
   send(fmt::format("STATUS={}", status));
 }
 
+void notify_reloading() {
+  send("RELOADING=1");
+}
+
 void notify_stopping(const std::string& status) {
   send(fmt::format("STOPPING=1\nSTATUS={}", status));
 }

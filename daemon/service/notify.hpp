@@ -13,6 +13,8 @@ namespace geoflow::daemon::service {
 void notify_ready(const std::string& status);
 /// STATUS=, one line that `systemctl status` shows.
 void notify_status(const std::string& status);
+/// RELOADING=1: the configuration is being read again; notify_ready() ends that.
+void notify_reloading();
 /// STOPPING=1 with a last STATUS=.
 void notify_stopping(const std::string& status);
 /// WATCHDOG=1: all is alive.

@@ -59,6 +59,18 @@ void Reporter::tell(const Observation& seen, HostTime now) {
   }
 }
 
+void Reporter::reloading() {
+  if (ready_) {
+    notify_reloading();
+  }
+}
+
+void Reporter::reloaded() {
+  if (ready_) {
+    notify_ready(told_.empty() ? "STARTING" : told_);
+  }
+}
+
 void Reporter::stopping(const std::string& why) {
   notify_stopping(why);
 }

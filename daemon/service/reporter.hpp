@@ -26,6 +26,11 @@ class Reporter {
   [[nodiscard]] bool is_due(HostTime now) const noexcept;
   /// Tells how the daemon is, if that has changed.
   void tell(const Observation& seen, HostTime now);
+  /// The configuration is being read again, and, later, has been.
+  void reloading();
+  void reloaded();
+  /// The status line as it was told last.
+  [[nodiscard]] const std::string& told() const noexcept { return told_; }
   /// The daemon is about to end.
   void stopping(const std::string& why);
 

@@ -10,6 +10,7 @@
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
+#include "geoflow/daemon/words.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
 
@@ -20,20 +21,6 @@ constexpr Duration kSilence = std::chrono::milliseconds{1500};
 constexpr Duration kRateWindow = std::chrono::seconds{3};
 
 }  // namespace
-
-std::string in_words(Duration duration) {
-  using std::chrono::duration_cast;
-  if (duration >= std::chrono::days{2}) {
-    return fmt::format("{} d", duration_cast<std::chrono::days>(duration).count());
-  }
-  if (duration >= std::chrono::hours{2}) {
-    return fmt::format("{} h", duration_cast<std::chrono::hours>(duration).count());
-  }
-  if (duration >= std::chrono::minutes{2}) {
-    return fmt::format("{} min", duration_cast<std::chrono::minutes>(duration).count());
-  }
-  return fmt::format("{} s", duration_cast<std::chrono::seconds>(duration).count());
-}
 
 std::string StatusLine::update(const Observation& seen, HostTime now) {
   std::string line = describe_pose(seen, now);

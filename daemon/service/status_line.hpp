@@ -58,7 +58,4 @@ class StatusLine {
   std::vector<Count> counts_;
 };
 
-/// `12 s`, `4 min`, `3 h`, `5 d`: whole units, rounded down.
-[[nodiscard]] std::string in_words(Duration duration);
-
 }  // namespace geoflow::daemon::service

@@ -3,11 +3,13 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <sys/epoll.h>
 #include <tl/expected.hpp>
@@ -15,6 +17,8 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"
+#include "geoflow/daemon/records.hpp"
+#include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/daemon/version.hpp"
 #include "geoflow/hal/exit_code.hpp"
@@ -23,6 +27,11 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
+#include "config/reload.hpp"
+#include "map/map_commands.hpp"
+#include "map/map_job.hpp"
+#include "protocol/control_request.hpp"
+#include "server/control_connection.hpp"
 #include "server/control_server.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_server.hpp"
@@ -42,8 +51,12 @@ constexpr auto kLastWords = std::chrono::seconds{1};  // that clients get to rea
 /// The daemon's objects and how they are wired. All on one thread, the loop's.
 class Daemon {
  public:
-  explicit Daemon(const Config& config, std::unique_ptr<EventLoop> loop, timesync::Doorbell bell)
-      : config_{config}, loop_{std::move(loop)}, bell_{std::move(bell)} {}
+  Daemon(const Config& config, std::function<Result<Config>()> read_config,
+         std::unique_ptr<EventLoop> loop, timesync::Doorbell bell)
+      : config_{config},
+        read_config_{std::move(read_config)},
+        loop_{std::move(loop)},
+        bell_{std::move(bell)} {}
 
   Result<void> start(service::GivenSockets given) {
     return watch_signals()
@@ -66,6 +79,8 @@ class Daemon {
 
  private:
   Result<void> watch_signals() {
+    // A file that grows over a limit is a map that is not saved, not the end.
+    (void)::signal(SIGXFSZ, SIG_IGN);
     auto watch = SignalWatch::create(*loop_, {SIGINT, SIGTERM, SIGHUP},
                                      [this](int signal) { on_signal(signal); });
     return std::move(watch).map([this](auto made) { signals_ = std::move(made); });
@@ -82,7 +97,11 @@ class Daemon {
     }
     if (given.control || !config_.socket.control.empty()) {
       auto server = ControlServer::create(
-          *loop_, config_.socket, [this] { return status(); }, std::move(given.control));
+          *loop_, config_.socket,
+          {.status = [this] { return status(); },
+           .config = [this] { return configuration(); },
+           .change = [this](Change change, const Asker& asker) { begin(change, asker); }},
+          std::move(given.control));
       if (!server) {
         return tl::unexpected{std::move(server.error())};
       }
@@ -101,6 +120,7 @@ class Daemon {
     if (!leaving_) {
       take_source();
     }
+    map_.turn(worker_->map(), running_.map.save_interval, HostClock::now());
     const bool ended = worker_->ended();  // before the pose is taken, which then is the last
     if (const auto pose = worker_->take_pose()) {
       resets_ = pose->reset_counter;
@@ -110,7 +130,7 @@ class Daemon {
       poses_->publish(*pose);
     }
     if (ended && !leaving_) {
-      config_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
+      running_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
     }
   }
 
@@ -136,7 +156,7 @@ class Daemon {
 
   void on_signal(int signal) {
     if (signal == SIGHUP) {
-      log::info("daemon", "SIGHUP: nothing to reload: the configuration is read at start only");
+      (void)reload();
       return;
     }
     log::info("daemon", "stopping on signal {}", signal);
@@ -145,8 +165,51 @@ class Daemon {
     leave(GEOFLOW_END_STOPPED);
   }
 
+  /// What a client asked for and may have.
+  void begin(Change change, const Asker& asker) {
+    const HostTime now = HostClock::now();
+    switch (change) {
+      case Change::kReload:
+        control_->conclude(asker, reload());
+        return;
+      case Change::kSaveMap:
+        map_.ask(MapJob::kSave, asker, now);
+        break;
+      case Change::kResetMap:
+        map_.ask(MapJob::kForget, asker, now);
+        break;
+      case Change::kReset:
+        map_.ask(MapJob::kRestart, asker, now);
+        break;
+    }
+    map_.turn(worker_->map(), running_.map.save_interval, now);
+  }
+
+  /// Reads the configuration again; what is wrong with it, or what has become of it.
+  Result<nlohmann::json> reload() {
+    reporter_.reloading();
+    auto reloaded = read_config_().and_then([this](const Config& read) {
+      return check_source(read).map([&] { return take_over(read, config_, running_); });
+    });
+    reporter_.reloaded();
+    if (!reloaded) {
+      log::error("daemon", "not reloaded: {}", reloaded.error().message);
+      return tl::unexpected{std::move(reloaded.error())};
+    }
+    if (poses_) {
+      poses_->set_limits(running_.socket);
+    }
+    if (control_) {
+      control_->set_limits(running_.socket);
+    }
+    log::info("daemon", "reloaded; changed: {}; at the next start only: {}",
+              fmt::join(reloaded->changed, ", "), fmt::join(reloaded->restart, ", "));
+    return nlohmann::json{{"changed", reloaded->changed}, {"restart", reloaded->restart}};
+  }
+
   void restart() {
     ++resets_;
+    map_.hold();
     worker_.reset();
     auto started = start_worker();
     if (!started) {
@@ -162,6 +225,7 @@ class Daemon {
   /// Says goodbye and ends once every client has heard it, or after kLastWords.
   void leave(geoflow_end_reason reason) {
     leaving_ = HostClock::now();
+    map_.abandon("the daemon ends");
     if (poses_) {
       poses_->finish(reason);
     }
@@ -188,12 +252,16 @@ class Daemon {
     if (leaving_ || !worker_) {
       return;
     }
+    map_.turn(worker_->map(), running_.map.save_interval, now);
     reporter_.watch(worker_->threads(), now);
     if (reporter_.is_due(now)) {
       service::Observation seen{
           .pose = newest_, .frames = worker_->frames(), .trouble = worker_->trouble()};
       for (auto& [name, health] : worker_->sources()) {
         seen.sources.push_back({.name = name == "imu" ? "IMU" : name, .health = std::move(health)});
+      }
+      if (seen.trouble.empty() && !map_.trouble().empty()) {
+        seen.trouble = "the map is not saved: " + map_.trouble();
       }
       reporter_.tell(seen, now);
     }
@@ -207,7 +275,19 @@ class Daemon {
     status["peak_memory_mib"] = peak_memory_mib();
     status["pose_socket"] = poses_ ? poses_->status() : nlohmann::json{};
     status["control_clients"] = control_->client_count();
+    status["summary"] = reporter_.told();
+    status["pose"] = newest_ ? pose_to_json(*newest_) : nlohmann::json{};
+    status["map"] = map_.status(HostClock::now());
+    status["map"]["file"] = config_.map.file.string();
     return status;
+  }
+
+  [[nodiscard]] nlohmann::json configuration() const {
+    nlohmann::json values = nlohmann::json::object();
+    for (const ConfigValue& key : list_keys(running_)) {
+      values[key.key] = key.value;
+    }
+    return values;
   }
 
  public:
@@ -215,13 +295,18 @@ class Daemon {
   [[nodiscard]] const std::optional<Error>& failure() const noexcept { return failure_; }
 
  private:
-  const Config& config_;
+  const Config& config_;  // as it was started
+  Config running_{config_};
+  std::function<Result<Config>()> read_config_;
   HostTime began_ = HostClock::now();
   std::unique_ptr<EventLoop> loop_;
   timesync::Doorbell bell_;  // from the worker's threads
   std::unique_ptr<SignalWatch> signals_;
   std::unique_ptr<PoseServer> poses_;
   std::unique_ptr<ControlServer> control_;
+  MapCommands map_{[this](const Asker& asker, const Result<nlohmann::json>& outcome) {
+    control_->conclude(asker, outcome);
+  }};
   std::uint32_t resets_ = 0;
   std::unique_ptr<Worker> worker_;
   std::optional<geoflow_pose> newest_;
@@ -232,7 +317,7 @@ class Daemon {
 
 }  // namespace
 
-Result<ExitCode> run_daemon(const Config& config) {
+Result<ExitCode> run_daemon(const Config& config, std::function<Result<Config>()> read_config) {
   auto given = service::take_given_sockets();
   if (!given) {
     return tl::unexpected{std::move(given.error())};
@@ -245,7 +330,7 @@ Result<ExitCode> run_daemon(const Config& config) {
   if (!bell) {
     return tl::unexpected{std::move(bell.error())};
   }
-  Daemon daemon{config, std::move(*loop), std::move(*bell)};
+  Daemon daemon{config, std::move(read_config), std::move(*loop), std::move(*bell)};
   auto done = daemon.start(std::move(*given)).and_then([&] { return daemon.run(); });
   if (!done) {
     return tl::unexpected{std::move(done.error())};

@@ -15,9 +15,12 @@ int main(int argc, char** argv) {
   if (const auto* exit = std::get_if<ExitCode>(&parsed)) {
     return static_cast<int>(*exit);
   }
-  const auto config = daemon::make_config(std::get<daemon::CommandLine>(parsed));
-  const auto done =
-      config.and_then([](const daemon::Config& ready) { return daemon::run_daemon(ready); });
+  const auto read_config = [&line = std::get<daemon::CommandLine>(parsed)] {
+    return daemon::make_config(line);
+  };
+  const auto config = read_config();
+  const auto done = config.and_then(
+      [&](const daemon::Config& ready) { return daemon::run_daemon(ready, read_config); });
   if (!done) {
     fmt::print(stderr, "geoflowd: {}\n", done.error().message);
     return static_cast<int>(exit_code(done.error()));

@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -12,57 +11,34 @@
 #include <utility>
 #include <vector>
 
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/types.h>
-#include <sys/un.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
-#include "geoflow/hal/unique_fd.hpp"
+
+#include "src/unix_socket.hpp"
 
 namespace geoflow::daemon {
 namespace {
 
 constexpr auto kHandshakeTimeout = std::chrono::seconds{5};
 
-Result<UniqueFd> connect_to(const std::filesystem::path& socket) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string text = socket.string();
-  if (text.size() >= sizeof address.sun_path) {
-    return fail(ErrorCode::kInvalidArgument, "{}: a socket's path has at most {} bytes", text,
-                sizeof address.sun_path - 1);
-  }
-  std::memcpy(&address.sun_path[0], text.data(), text.size());
-  UniqueFd fd{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)};
-  const void* generic = &address;
-  if (fd && ::connect(fd.get(), static_cast<const sockaddr*>(generic), sizeof address) == 0) {
-    return fd;
-  }
-  if (errno == ECONNREFUSED) {
-    return fail(ErrorCode::kUnavailable, "{}: no daemon answers", text);
-  }
-  if (errno == ENOENT) {
-    return fail(ErrorCode::kUnavailable, "{}: no such socket; is geoflowd running?", text);
-  }
-  return fail_errno(text);
-}
-
 /// The bytes of the next datagram; empty when the peer has closed; nothing after `timeout` or a
 /// signal.
 Result<std::optional<std::vector<std::byte>>> receive_datagram(int fd, Duration timeout) {
-  pollfd waiting{.fd = fd, .events = POLLIN, .revents = 0};
-  const auto milliseconds = std::chrono::ceil<std::chrono::milliseconds>(timeout).count();
-  const int ready = ::poll(&waiting, 1, static_cast<int>(milliseconds));
-  if (ready == 0 || (ready < 0 && errno == EINTR)) {
+  const auto readable = wait_readable(fd, timeout);
+  if (!readable) {
+    return tl::unexpected{readable.error()};
+  }
+  if (!*readable) {
     return std::nullopt;
   }
   std::vector<std::byte> bytes(GEOFLOW_MAX_RECORD);
-  const ssize_t size = ready < 0 ? -1 : ::recv(fd, bytes.data(), bytes.size(), 0);
+  const ssize_t size = ::recv(fd, bytes.data(), bytes.size(), 0);
   if (size < 0 && errno == ECONNRESET) {
     bytes.clear();
     return bytes;
@@ -95,7 +71,7 @@ Result<geoflow_welcome> judge_answer(std::span<const std::byte> bytes) {
 
 Result<PoseClient> PoseClient::connect(const std::filesystem::path& socket,
                                        const Options& options) {
-  auto fd = connect_to(socket);
+  auto fd = connect_to(socket, SOCK_SEQPACKET);
   if (!fd) {
     return tl::unexpected{std::move(fd.error())};
   }

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -30,10 +29,9 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
-#include "geoflow/slam/core.hpp"
-#include "geoflow/slam/saved_map.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
+#include "map/map_keeper.hpp"
 #include "src/opener.hpp"
 
 namespace geoflow::daemon {
@@ -124,27 +122,39 @@ Result<void> Worker::proceed() {
 }
 
 Result<void> Worker::launch() {
-  const EstimateHandler on_estimate = [this](const SyncedPacket& packet,
-                                             const PoseEstimate& estimate) {
-    publish(packet, estimate);
-  };
-  const PropagatedHandler on_propagated = [this](const PropagatedPose& pose) {
-    propagated_.store(make_pose(pose, context(pose.estimate.t)));
-    bell_.ring();
-  };
-  if (config_.source.realtime) {
-    auto pipeline = Pipeline::start(
-        *run_, config_,
-        {.on_estimate = on_estimate, .on_end = [this] { end(); }, .on_propagated = on_propagated});
-    if (!pipeline) {
-      return tl::unexpected{std::move(pipeline.error())};
-    }
-    pipeline_ = std::move(*pipeline);
-    return {};
+  auto keeper = MapKeeper::start(*run_, config_, bell_, [this] { wake_estimator(); });
+  if (!keeper) {
+    return tl::unexpected{std::move(keeper.error())};
   }
-  lock_step_ = std::jthread{[this, on_estimate, on_propagated](const std::stop_token& stop) {
+  keeper_ = std::move(*keeper);
+  PipelineHandlers handlers{
+      .on_estimate = [this](const SyncedPacket& packet,
+                            const PoseEstimate& estimate) { publish(packet, estimate); },
+      .on_end = [this] { end(); },
+      .on_propagated =
+          [this](const PropagatedPose& pose) {
+            propagated_.store(make_pose(pose, context(pose.estimate.t)));
+            bell_.ring();
+          },
+      .between_frames = [this] { return keeper_->between_frames(); }};
+  if (config_.source.realtime) {
+    return launch_pipeline(std::move(handlers));
+  }
+  launch_lock_step(std::move(handlers));
+  return {};
+}
+
+Result<void> Worker::launch_pipeline(PipelineHandlers handlers) {
+  auto pipeline = Pipeline::start(*run_, config_, std::move(handlers));
+  return std::move(pipeline).map([this](auto started) { pipeline_ = std::move(started); });
+}
+
+void Worker::launch_lock_step(PipelineHandlers handlers) {
+  lock_step_ = std::jthread{[this, handlers = std::move(handlers)](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "slam");
-    const auto done = LockStepRunner{*run_, config_, on_estimate, on_propagated}.run(stop);
+    LockStepRunner runner{*run_, config_, handlers.on_estimate, handlers.on_propagated,
+                          handlers.between_frames};
+    const auto done = runner.run(stop);
     if (!done) {
       log::error("replay", "{}", done.error().message);
     }
@@ -152,7 +162,13 @@ Result<void> Worker::launch() {
       end();
     }
   }};
-  return {};
+}
+
+/// In lock step it never waits.
+void Worker::wake_estimator() {
+  if (pipeline_) {
+    pipeline_->wake();
+  }
 }
 
 void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
@@ -176,30 +192,21 @@ void Worker::end() {
 }
 
 void Worker::stop() {
-  pipeline_.reset();
+  if (pipeline_) {
+    pipeline_->stop();
+  }
   if (lock_step_.joinable()) {
     lock_step_.request_stop();
     lock_step_.join();
   }
-  if (!std::exchange(map_saved_, true)) {
-    save_map();
+  if (keeper_) {
+    keeper_->stop();
+    if (const auto outcome = keeper_->save_at_end(); outcome && !outcome->report) {
+      log::error("map", "not saved: {}", outcome->report.error().message);
+    }
   }
-}
-
-void Worker::save_map() {
-  const std::filesystem::path& file = config_.map.file;
-  // What was refused may be somebody's; only where nothing was, a new map may be.
-  if (file.empty() || !run_) {
-    return;
-  }
-  if (const std::optional<Error>& refused = run_->map_refused;
-      refused && refused->code != ErrorCode::kNotFound) {
-    return;
-  }
-  const auto saved = slam::save_map(*run_->core->snapshot(), file);
-  if (!saved) {
-    log::error("map", "not saved: {}", saved.error().message);
-  }
+  keeper_.reset();
+  pipeline_.reset();  // which the keeper wakes
 }
 
 nlohmann::json Worker::status() {
@@ -226,13 +233,18 @@ nlohmann::json Worker::status() {
 }
 
 std::vector<ThreadActivity> Worker::threads() const {
+  std::vector<ThreadActivity> threads;
   if (pipeline_) {
-    return pipeline_->threads();
+    threads = pipeline_->threads();
+  } else if (lock_step_.joinable()) {
+    threads = {{.name = "slam", .turns = run_->activity().turns + frames(), .idle = ended()}};
+  } else {
+    threads = {opener_.activity()};
   }
-  if (lock_step_.joinable()) {
-    return {{.name = "slam", .turns = run_->activity().turns + frames(), .idle = ended()}};
+  if (keeper_) {
+    threads.push_back(keeper_->activity());
   }
-  return {opener_.activity()};
+  return threads;
 }
 
 std::vector<SourceReport> Worker::sources() {

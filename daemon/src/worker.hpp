@@ -24,6 +24,7 @@
 #include "geoflow/timesync/doorbell.hpp"
 #include "geoflow/timesync/latest.hpp"
 
+#include "map/map_keeper.hpp"
 #include "src/opener.hpp"
 
 namespace geoflow::daemon {
@@ -66,6 +67,9 @@ class Worker {
   /// Ends all its threads and, the first time, saves the configured map.
   void stop();
 
+  /// Work on the map in the background, once the source is open; null before.
+  [[nodiscard]] MapKeeper* map() noexcept { return keeper_.get(); }
+
   /// For the status reply.
   [[nodiscard]] nlohmann::json status();
   /// What its threads show of themselves.
@@ -85,7 +89,9 @@ class Worker {
   void publish(const SyncedPacket& packet, const PoseEstimate& estimate);
   [[nodiscard]] PoseContext context(HostTime t) const;
   void end();
-  void save_map();
+  void wake_estimator();
+  [[nodiscard]] Result<void> launch_pipeline(PipelineHandlers handlers);
+  void launch_lock_step(PipelineHandlers handlers);
 
   const Config& config_;
   timesync::Doorbell& bell_;
@@ -94,9 +100,9 @@ class Worker {
   timesync::Latest<geoflow_pose> newest_;      // from the estimating thread to the loop's
   timesync::Latest<geoflow_pose> propagated_;  // from the synchronising thread to the loop's
   std::atomic<bool> ended_{false};
+  std::unique_ptr<MapKeeper> keeper_;
   std::unique_ptr<Pipeline> pipeline_;
   std::jthread lock_step_;
-  bool map_saved_ = false;
   Opener opener_;
 };
 

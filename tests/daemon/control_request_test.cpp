@@ -1,7 +1,9 @@
 #include "protocol/control_request.hpp"
 
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,20 +27,46 @@ TEST(ControlRequest, CommandsAreParsed) {
       std::holds_alternative<HelpRequest>(parse_control_request(R"({"cmd":"help"})")->command));
 }
 
-TEST(ControlRequest, ErrorsSayWhatIsWrong) {
-  const auto error = [](const std::string& line) {
-    return parse_control_request(line).error().message;
+TEST(ControlRequest, ChangesAreParsed) {
+  const auto change = [](const std::string& line) {
+    return std::get<Change>(parse_control_request(line).value().command);
   };
-  EXPECT_THAT(error(""), HasSubstr("one JSON object"));
-  EXPECT_THAT(error("{"), HasSubstr("one JSON object"));
-  EXPECT_THAT(error("[1]"), HasSubstr("one JSON object"));
-  EXPECT_THAT(error(R"({"a":1})"), HasSubstr("cmd"));
-  EXPECT_THAT(error(R"({"cmd":"reboot"})"), HasSubstr("help, status, watch, unwatch"));
-  EXPECT_THAT(error(R"({"cmd":"status","rate_hz":1})"), HasSubstr("unknown key \"rate_hz\""));
-  EXPECT_THAT(error(R"({"cmd":"watch","stream":"cloud"})"), HasSubstr("stream"));
-  EXPECT_THAT(error(R"({"cmd":"watch","rate_hz":-1})"), HasSubstr("rate_hz"));
-  EXPECT_THAT(error(R"({"cmd":"watch","rate_hz":"fast"})"), HasSubstr("rate_hz"));
-  EXPECT_THAT(error(R"({"cmd":"status","id":{}})"), HasSubstr("id"));
+  EXPECT_EQ(change(R"({"cmd":"map","do":"save"})"), Change::kSaveMap);
+  EXPECT_EQ(change(R"({"cmd":"map","do":"reset"})"), Change::kResetMap);
+  EXPECT_EQ(change(R"({"cmd":"reset"})"), Change::kReset);
+  EXPECT_EQ(change(R"({"cmd":"reload"})"), Change::kReload);
+}
+
+/// Requests that are wrong, and a part of what is said of each.
+using Wrong = std::vector<std::pair<std::string, std::string>>;
+
+void expect_errors(const Wrong& wrong) {
+  for (const auto& [line, message] : wrong) {
+    const auto request = parse_control_request(line);
+    ASSERT_FALSE(request) << line;
+    EXPECT_THAT(request.error().message, HasSubstr(message)) << line;
+  }
+}
+
+TEST(ControlRequest, ErrorsSayWhatIsWrong) {
+  expect_errors(
+      {{"", "one JSON object"},
+       {"{", "one JSON object"},
+       {"[1]", "one JSON object"},
+       {R"({"a":1})", "cmd"},
+       {R"({"cmd":"reboot"})", "help, status, watch, unwatch, config, map, reset, reload"},
+       {R"({"cmd":"status","id":{}})", "id"}});
+}
+
+TEST(ControlRequest, ErrorsNameTheKey) {
+  expect_errors({{R"({"cmd":"status","rate_hz":1})", "unknown key \"rate_hz\""},
+                 {R"({"cmd":"watch","stream":"cloud"})", "stream"},
+                 {R"({"cmd":"watch","rate_hz":-1})", "rate_hz"},
+                 {R"({"cmd":"watch","rate_hz":"fast"})", "rate_hz"},
+                 {R"({"cmd":"map"})", "do: must be \"save\" or \"reset\""},
+                 {R"({"cmd":"map","do":"burn"})", "do: must be"},
+                 {R"({"cmd":"map","do":"save","file":"x"})", "unknown key \"file\""},
+                 {R"({"cmd":"reset","do":"save"})", "unknown key \"do\""}});
 }
 
 TEST(ControlRequest, DepthAndLengthAreBounded) {

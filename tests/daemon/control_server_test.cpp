@@ -1,8 +1,14 @@
 #include <cstdint>
 #include <string>
 
+#include <grp.h>
+#include <sys/wait.h>
+
+#include "geoflow/daemon/control_client.hpp"
+#include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
 
+#include "server/authority.hpp"
 #include "server_fixture.hpp"
 
 namespace geoflow::daemon {
@@ -65,6 +71,116 @@ TEST_F(ServerTest, ControlCutsOffLongLinesFloodsAndDeafWatchers) {
     publish(frame);
   }
   EXPECT_TRUE(eventually([this] { return clients() == 0; }));
+}
+
+TEST(Authority, IsRootsTheDaemonsUsersAndTheGroups) {
+  const Authority authority{1000, 200, "robots"};
+  const auto peer = [](uid_t uid, gid_t gid, std::vector<gid_t> groups) {
+    return Connection{.fd = {}, .pid = 77, .uid = uid, .gid = gid, .groups = std::move(groups)};
+  };
+  EXPECT_TRUE(authority.permits(peer(0, 0, {})));
+  EXPECT_TRUE(authority.permits(peer(1000, 1000, {})));
+  EXPECT_TRUE(authority.permits(peer(1001, 200, {})));
+  EXPECT_TRUE(authority.permits(peer(1001, 1001, {5, 200, 7})));
+  EXPECT_FALSE(authority.permits(peer(1001, 1001, {5, 7})));
+  const std::string refusal = authority.refusal(peer(1001, 1001, {}), "reload");
+  EXPECT_THAT(refusal, HasSubstr("reload"));
+  EXPECT_THAT(refusal, HasSubstr("user 1001 (process 77)"));
+  EXPECT_THAT(refusal, HasSubstr("group robots"));
+}
+
+TEST(Authority, NeedsAGroupThatIsThere) {
+  const auto unknown = Authority::create("no-such-group");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(unknown.error().message, HasSubstr("socket.group: no group is named no-such-group"));
+  EXPECT_TRUE(Authority::create(""));
+}
+
+TEST_F(ServerTest, ControlAnswersChangesWhenTheyAreDone) {
+  const UniqueFd fd = raw_socket(config_.control, SOCK_STREAM);
+  LineReader lines{fd.get()};
+  (void)lines.next();
+  say(fd.get(),
+      "{\"cmd\":\"map\",\"do\":\"save\",\"id\":1}\n{\"cmd\":\"reset\",\"id\":2}\n{\"cmd\":"
+      "\"config\"}\n");
+  EXPECT_EQ((*lines.next())["config"]["map.file"], "\"\"");  // what needs no time comes first
+  on_loop([this] {
+    ASSERT_EQ(changes_.size(), 2U);
+    EXPECT_EQ(changes_[0].first, Change::kSaveMap);
+    EXPECT_EQ(changes_[1].first, Change::kReset);
+    control_->conclude(changes_[1].second, fail(ErrorCode::kSystem, "no room"));
+    control_->conclude(changes_[0].second, nlohmann::json{{"saved", "a.map"}});
+  });
+  const auto failed = lines.next();
+  EXPECT_EQ((*failed)["id"], 2);
+  EXPECT_EQ((*failed)["ok"], false);
+  EXPECT_EQ((*failed)["error"]["code"], "system");
+  EXPECT_EQ((*failed)["error"]["message"], "no room");
+  const auto saved = lines.next();
+  EXPECT_EQ((*saved)["id"], 1);
+  EXPECT_EQ((*saved)["reply"], "map");
+  EXPECT_EQ((*saved)["saved"], "a.map");
+}
+
+TEST_F(ServerTest, ControlForgetsTheChangeOfAClientThatHasGone) {
+  {
+    const UniqueFd fd = raw_socket(config_.control, SOCK_STREAM);
+    LineReader lines{fd.get()};
+    (void)lines.next();
+    say(fd.get(), "{\"cmd\":\"reload\"}\n{\"cmd\":\"status\"}\n");
+    EXPECT_EQ((*lines.next())["reply"], "status");
+  }
+  ASSERT_TRUE(eventually([this] { return clients() == 0; }));
+  const UniqueFd later = raw_socket(config_.control, SOCK_STREAM);  // has the same descriptor
+  LineReader lines{later.get()};
+  (void)lines.next();
+  on_loop([this] {
+    ASSERT_EQ(changes_.size(), 1U);
+    control_->conclude(changes_[0].second, nlohmann::json::object());
+  });
+  say(later.get(), "{\"cmd\":\"status\"}\n");
+  EXPECT_EQ((*lines.next())["reply"], "status");
+}
+
+/// What another user's process hears when it asks for a reload: written to a file by that process.
+nlohmann::json asked_as_nobody(const std::filesystem::path& control,
+                               const std::filesystem::path& answer) {
+  constexpr uid_t kNobody = 65534;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::ofstream file{answer};
+    const bool changed =
+        ::setgroups(0, nullptr) == 0 && ::setgid(kNobody) == 0 && ::setuid(kNobody) == 0;
+    auto client = ControlClient::connect(control);
+    if (!changed || !client) {
+      ::_exit(1);
+    }
+    const auto reply = client->request({{"cmd", "reload"}}, std::chrono::seconds{5});
+    const auto status = client->request({{"cmd", "status"}}, std::chrono::seconds{5});
+    file << nlohmann::json{{"refused", reply ? "" : reply.error().message},
+                           {"status", status ? *status : nlohmann::json{}}};
+    file.close();
+    ::_exit(0);
+  }
+  int status = -1;
+  EXPECT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  std::ifstream file{answer};
+  return nlohmann::json::parse(file, nullptr, false);
+}
+
+TEST_F(ServerTest, ControlRefusesAnotherUsersChangesAndAnswersHisQuestions) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "only root can ask as somebody else";
+  }
+  ::chmod(config_.control.c_str(), 0666);
+  ::chmod(directory_.path().c_str(), 0755);
+  const nlohmann::json heard = asked_as_nobody(config_.control, directory_.path() / "answer");
+  ASSERT_TRUE(heard.is_object());
+  EXPECT_THAT(heard["refused"].get<std::string>(), HasSubstr("reload: not for user 65534"));
+  EXPECT_EQ(heard["status"]["status"]["state"], "fine");
+  on_loop([this] { EXPECT_TRUE(changes_.empty()); });
 }
 
 }  // namespace

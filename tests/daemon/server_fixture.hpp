@@ -35,6 +35,8 @@
 #include "geoflow/hal/unique_fd.hpp"
 #include "tests/support/data.hpp"
 
+#include "protocol/control_request.hpp"
+#include "server/control_connection.hpp"
 #include "server/control_server.hpp"
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
@@ -53,9 +55,13 @@ class ServerTest : public testing::Test {
     config_.clients = 4;
     loop_ = EventLoop::create().value();
     poses_ = PoseServer::create(*loop_, config_, GEOFLOW_CLOCK_REPLAY).value();
-    control_ = ControlServer::create(*loop_, config_, [] {
-                 return nlohmann::json{{"state", "fine"}};
-               }).value();
+    control_ = ControlServer::create(
+                   *loop_, config_,
+                   {.status = [] { return nlohmann::json{{"state", "fine"}}; },
+                    .config = [] { return nlohmann::json{{"map.file", "\"\""}}; },
+                    .change = [this](Change change,
+                                     const Asker& asker) { changes_.emplace_back(change, asker); }})
+                   .value();
     ASSERT_TRUE(loop_->add_timer(std::chrono::milliseconds{20}, [this] {
       poses_->check_timeouts();
       control_->check_timeouts();
@@ -142,6 +148,7 @@ class ServerTest : public testing::Test {
   std::unique_ptr<EventLoop> loop_;
   std::unique_ptr<PoseServer> poses_;
   std::unique_ptr<ControlServer> control_;
+  std::vector<std::pair<Change, Asker>> changes_;  // that were asked for; the loop's
   std::thread thread_;
 };
 

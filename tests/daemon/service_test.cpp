@@ -13,6 +13,7 @@
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/thread_activity.hpp"
+#include "geoflow/daemon/words.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"

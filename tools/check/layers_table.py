@@ -9,7 +9,8 @@ PARTS = {
     "slam": {"slam", "hal"},
     "daemon": {"daemon", "slam", "drivers", "timesync", "hal"},
     "tools": {"tools", "daemon", "slam", "drivers", "timesync", "hal"},
-    "tests": {"tests", "tools", "daemon", "slam", "drivers", "timesync", "hal"},
+    "clients": {"clients", "daemon"},  # of the daemon the protocol's header alone
+    "tests": {"tests", "clients", "tools", "daemon", "slam", "drivers", "timesync", "hal"},
 }
 
 # Parts to which time is an argument.
@@ -72,7 +73,7 @@ LIBRARIES = (
 # The standard library, POSIX and the kernel's general interfaces.
 STANDARD = (r"^([a-z_]+|(sys|arpa|netinet|linux|net)/[a-z_]+\.h|[a-z_]*(unistd|fcntl|signal|poll|dirent|pthread|sched|"
             r"stdlib|string|stdio|stdint|stddef|stdbool|errno|endian|inttypes|time|math|getopt|termios|dlfcn|cxxabi|spawn|"
-            r"grp|pwd|sysexits|locale|malloc|float|limits|assert|ctype)\.h)$")
+            r"stdarg|grp|pwd|sysexits|locale|malloc|float|limits|assert|ctype)\.h)$")
 
 THREAD_HEADERS = {"thread", "mutex", "condition_variable", "shared_mutex", "semaphore", "barrier", "latch", "future",
                   "pthread.h"}
@@ -98,6 +99,8 @@ THREAD_FILES = (
     "drivers/replay/prefetcher.hpp",
     "drivers/replay/recorded_streams.cpp",  # paced replay waits for the next stamp, interruptibly
     "daemon/pipeline/pipeline.cpp",  # makes the live pipeline's threads
+    "daemon/map/map_keeper.cpp",  # makes the thread that writes the map
+    "daemon/map/map_keeper.hpp",
     "daemon/src/opener.cpp",  # makes the thread that waits for a camera
     "daemon/src/opener.hpp",
     "daemon/src/signal_watch.cpp",  # blocks signals for all threads

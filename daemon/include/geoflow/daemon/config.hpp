@@ -76,7 +76,8 @@ struct PipelineConfig {
 
 /// The map that outlives the daemon.
 struct MapConfig {
-  std::filesystem::path file;  ///< empty: none
+  std::filesystem::path file;                         ///< empty: none
+  Duration save_interval = std::chrono::seconds{60};  ///< while it changes; zero: at the end only
 };
 // NOLINTEND(readability-magic-numbers)
 

@@ -16,9 +16,10 @@ namespace geoflow::daemon {
 /// gives the same estimates bit for bit on one machine. Thread-bound.
 class LockStepRunner {
  public:
-  /// `run` and `config` must outlive it. Poses are propagated only where `on_propagated` is given.
+  /// `run` and `config` must outlive it. Poses are propagated only where `on_propagated` is given;
+  /// `between_frames` is called before each frame.
   LockStepRunner(Run& run, const Config& config, EstimateHandler handler,
-                 PropagatedHandler on_propagated = {});
+                 PropagatedHandler on_propagated = {}, BetweenFrames between_frames = {});
 
   /// Runs to the recording's end, or until `stop`; then leaves the estimator as it is. Samples that
   /// cannot be decoded are counted, not fatal. An error only where a port cannot be started.
@@ -31,6 +32,7 @@ class LockStepRunner {
   const Config& config_;
   EstimateHandler handler_;
   PropagatedHandler on_propagated_;
+  BetweenFrames between_frames_;
 };
 
 }  // namespace geoflow::daemon

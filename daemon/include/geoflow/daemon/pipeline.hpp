@@ -17,6 +17,7 @@ struct PipelineHandlers {
   std::function<void()> on_end;  ///< on slam, once, when the source has ended and its last packet
                                  ///< is done; not after stop()
   PropagatedHandler on_propagated{};  ///< on sync; empty: nothing is propagated
+  BetweenFrames between_frames{};     ///< on slam, before each frame and after wake()
 };
 
 /// The live pipeline, on threads of its own:
@@ -42,6 +43,9 @@ class Pipeline {
   /// Ends all threads, after the packet that is worked on, and joins them; then run.synchroniser is
   /// filled. Not from one of its own threads. Idempotent.
   void stop();
+
+  /// Has handlers.between_frames called soon, whether frames come or not. Any thread.
+  void wake() noexcept;
 
   /// What its threads show of themselves. Any thread, until stop().
   [[nodiscard]] std::vector<ThreadActivity> threads() const;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -20,6 +21,10 @@ namespace geoflow::daemon {
 /// Gets every estimate with its packet, on the thread that estimates. Must not block.
 using EstimateHandler = std::function<void(const SyncedPacket&, const PoseEstimate&)>;
 
+/// Called on the thread that estimates, between two frames: `run.core` is the handler's meanwhile.
+/// True where it has put another one there.
+using BetweenFrames = std::function<bool()>;
+
 /// Gets every propagated pose, on the thread that synchronises. Must not block.
 using PropagatedHandler = std::function<void(const PropagatedPose&)>;
 
@@ -32,6 +37,10 @@ struct Run : Sources {
   /// Why the configured map was not taken; none where it was, or none is configured.
   std::optional<Error> map_refused{};
   timesync::SynchroniserCounters synchroniser{};  ///< filled when the run is over
+  /// The estimator's thread: discontinuities before the present `core`, which are added to those of
+  /// its estimates, and the sum in the newest one.
+  std::uint32_t earlier_resets = 0;
+  std::uint32_t resets = 0;
 };
 
 /// check_sources(), and whether there is a recording or a camera at all.
