@@ -19,6 +19,8 @@
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
+#include "map/list.hpp"
+#include "map/live.hpp"
 #include "map/point_file.hpp"
 
 namespace geoflow::tools {
@@ -29,22 +31,22 @@ constexpr double kLeastCellM = 0.001;
 constexpr double kLargestCellM = 10;
 
 constexpr std::string_view kExamples =
-    "  geoflow map info home.map                                 what it holds, every byte "
-    "checked\n"
-    "  geoflow map info home.map --json                          the same for scripts\n"
-    "  geoflow map export home.map --planes planes.ply           surfaces with normals\n"
-    "  geoflow map export home.map --points p.pcd --keyframes k.txt\n"
-    "                                                            points, and keyframes as "
-    "TUM text\n"
-    "A map is made by geoflow replay --save-map or by geoflowd (key map.file). Its format: "
-    "docs/map-file.md.";
+    R"(  geoflow map info home.map                                 what it holds, every byte checked
+  geoflow map info home.map --json                          the same for scripts
+  geoflow map export home.map --planes planes.ply           surfaces with normals
+  geoflow map export home.map --points p.pcd --keyframes k.txt
+                                                            points, and keyframes as TUM text
+  geoflow map ls /var/lib/geoflow                           the maps in a folder
+  geoflow map save                                          the running daemon's, now
+  geoflow map reset                                         the running daemon begins an empty one
+A map is made by geoflow replay --save-map or by geoflowd (key map.file). Its format: docs/map-file.md.)";
 
-/// `geoflow map info|export MAP`.
+/// `geoflow map info|export MAP`, `geoflow map ls [FOLDER]`, `geoflow map save|reset`.
 class MapVerb final : public Verb {
  public:
   [[nodiscard]] std::string_view name() const override { return "map"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "Look at a saved map; export its trajectory, points and planes";
+    return "Look at saved maps, export what they hold; save or reset the running daemon's";
   }
   [[nodiscard]] std::string_view examples() const override { return kExamples; }
 
@@ -61,9 +63,21 @@ class MapVerb final : public Verb {
         ->add_option("--cell", cell_m_, "At most one piece of surface in a cube of this size [m]")
         ->check(CLI::Range(kLeastCellM, kLargestCellM))
         ->capture_default_str();
+    list_.declare(command);
+    live_.declare(command);
+    for (CLI::App* subcommand : command.get_subcommands(nullptr)) {
+      subcommand->fallthrough();  // --json is the verb's
+      subcommand->footer("Examples:\n" + std::string{kExamples});
+    }
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
+    if (list_.parsed()) {
+      return list_.run(console);
+    }
+    if (live_.parsed()) {
+      return live_.run(console);
+    }
     const auto map = slam::load_map(map_);
     if (!map) {
       return tl::unexpected{map.error()};
@@ -73,11 +87,7 @@ class MapVerb final : public Verb {
   }
 
  private:
-  void add_map(CLI::App& command) {
-    command.add_option("map", map_, "Map file")->required();
-    command.fallthrough();  // --json is the verb's
-    command.footer("Examples:\n" + std::string{kExamples});
-  }
+  void add_map(CLI::App& command) { command.add_option("map", map_, "Map file")->required(); }
 
   [[nodiscard]] Result<void> inform(const slam::StoredMap& map, Console& console) const {
     auto intact = slam::check_depth(map);
@@ -148,6 +158,8 @@ class MapVerb final : public Verb {
   std::string points_;
   std::string planes_;
   double cell_m_ = kDefaultCellM;
+  MapList list_;
+  LiveMap live_;
 };
 
 }  // namespace

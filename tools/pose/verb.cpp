@@ -1,8 +1,6 @@
 #include "geoflow/tools/verb.hpp"
 
 #include <chrono>
-#include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <fstream>
 #include <ios>
@@ -14,22 +12,20 @@
 
 #include <CLI/App.hpp>
 #include <CLI/Validators.hpp>
-#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/pose_client.hpp"
-#include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/hal/exit_code.hpp"
-#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
+#include "geoflow/tools/pose_text.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 namespace geoflow::tools {
@@ -41,8 +37,6 @@ using daemon::ReceivedPose;
 constexpr auto kWaitSlice = std::chrono::milliseconds{200};
 constexpr double kHighestRateHz = 1000;
 constexpr double kCameraRateHz = 30;  // a D435i's: who asks for more wants the IMU's poses
-constexpr double kMillisecondsPerNanosecond = 1e-6;
-constexpr double kDegreesPerRadian = 57.29577951308232;
 
 constexpr std::string_view kExamples =
     "  geoflow pose                              every pose, one a line, until the daemon "
@@ -55,53 +49,6 @@ constexpr std::string_view kExamples =
     "geoflow "
     "evaluate\n"
     "Any number of them may run at once. The keys of the JSON: docs/protocol.md.";
-
-/// T_map_base as p and q of the record's two transforms.
-SE3 map_from_base(const geoflow_pose& pose) {
-  const auto transform = [](const double* q, const double* p) {
-    return SE3{Eigen::Quaterniond{q[3], q[0], q[1], q[2]}, Vector3d{p[0], p[1], p[2]}};
-  };
-  const SE3 T_map_odom = transform(&pose.q_map_odom[0], &pose.p_map_odom[0]);
-  const SE3 T_odom_base = transform(&pose.q_odom_base[0], &pose.p_odom_base[0]);
-  return T_map_odom * T_odom_base;
-}
-
-/// Standard deviation of the position: the root of the covariance's first three diagonal elements.
-double position_sigma_m(const geoflow_pose& pose) {
-  constexpr std::size_t kXx = 0;
-  constexpr std::size_t kYy = 6;
-  constexpr std::size_t kZz = 11;
-  return std::sqrt(pose.covariance[kXx] + pose.covariance[kYy] + pose.covariance[kZz]);
-}
-
-std::string text_line(const ReceivedPose& received) {
-  const geoflow_pose& pose = received.pose;
-  const SE3 T_map_base = map_from_base(pose);
-  const Vector3d& p = T_map_base.translation();
-  const Matrix3d R = T_map_base.rotation_matrix();
-  const double yaw_deg = std::atan2(R(1, 0), R(0, 0)) * kDegreesPerRadian;
-  const auto status = static_cast<TrackingStatus>(pose.status);
-  std::string line = fmt::format(
-      "{:.3f} {:12} x {:8.3f} y {:8.3f} z {:8.3f} m  yaw {:7.2f} deg  sigma {:.3f} m  quality {:3}",
-      to_seconds(Duration{pose.t_recording_ns}), to_string(status), p.x(), p.y(), p.z(), yaw_deg,
-      position_sigma_m(pose), pose.quality);
-  if ((pose.clock_flags & GEOFLOW_CLOCK_UNPACED) == 0) {
-    const auto latency_ns =
-        static_cast<double>(received.t_received.time_since_epoch().count() - pose.t_arrival_ns);
-    line += fmt::format("  latency {:.1f} ms", latency_ns * kMillisecondsPerNanosecond);
-  }
-  if (received.dropped > 0) {
-    line += fmt::format("  missed {}", received.dropped);
-  }
-  return line;
-}
-
-nlohmann::json json_line(const ReceivedPose& received) {
-  nlohmann::json line = daemon::pose_to_json(received.pose);
-  line["dropped"] = received.dropped;
-  line["t_received_ns"] = received.t_received.time_since_epoch().count();
-  return line;
-}
 
 class PoseVerb final : public Verb {
  public:
@@ -183,9 +130,9 @@ class PoseVerb final : public Verb {
 
   static void show(const ReceivedPose& received, Console& console) {
     if (console.json()) {
-      console.object(json_line(received));
+      console.object(pose_object(received));
     } else {
-      console.line("{}", text_line(received));
+      console.line("{}", pose_line(received));
     }
   }
 
