@@ -77,7 +77,7 @@ Result<Change> parse_map(const json& object) {
   if (what != object.end() && *what == "reset") {
     return Change::kResetMap;
   }
-  return fail(ErrorCode::kInvalidArgument, "do: must be \"save\" or \"reset\"");
+  return fail(ErrorCode::kInvalidArgument, R"(do: must be "save" or "reset")");
 }
 
 using Command = decltype(ControlRequest::command);

@@ -63,7 +63,7 @@ const json& help() {
       {"watch", "poses as they come; rate_hz (0 to 1000, 0 or none: every one), stream (\"pose\")"},
       {"unwatch", "ends watch"},
       {"config", "every key of the configuration with its value"},
-      {"map", "do (\"save\", \"reset\"): writes the map to its file now, or begins an empty one"},
+      {"map", R"(do ("save", "reset"): writes the map to its file now, or begins an empty one)"},
       {"reset", "the estimator begins anew in the map as it is"},
       {"reload", "reads the configuration again; what cannot change at run time is named"}};
   return commands;

@@ -115,7 +115,7 @@ Result<std::optional<json>> ControlClient::next(Duration timeout) {
 }
 
 Result<void> ControlClient::send(const json& request) const {
-  std::string line = request.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
+  const std::string line = request.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
   for (std::string_view left = line; !left.empty();) {
     const ssize_t size = ::send(fd_.get(), left.data(), left.size(), MSG_NOSIGNAL);
     if (size < 0 && errno != EINTR) {

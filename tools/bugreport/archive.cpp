@@ -13,7 +13,7 @@
 
 #include <fcntl.h>
 #include <spawn.h>
-#include <stdlib.h>
+#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp is POSIX
 #include <sys/types.h>
 #include <sys/wait.h>
 #include <tl/expected.hpp>

@@ -88,19 +88,25 @@ class WatchVerb final : public Verb {
         }
         shown += only_status_ && *changed ? 1U : 0U;
       }
-      auto received = poses.receive(kWaitSlice);
+      const auto received = poses.receive(kWaitSlice);
       if (!received) {
-        return tl::unexpected{std::move(received.error())};
+        return tl::unexpected{received.error()};
       }
       if (const auto* ended = std::get_if<PoseClient::Ended>(&*received)) {
-        return ended->reason != 0 ? Result<ExitCode>{ExitCode::kOk}
-                                  : fail(ErrorCode::kUnavailable, "the daemon has gone");
+        return at_end(*ended);
       }
       if (const auto* pose = std::get_if<ReceivedPose>(&*received);
           pose != nullptr && !only_status_) {
         show(*pose, console);
         ++shown;
       }
+    }
+    return ExitCode::kOk;
+  }
+
+  [[nodiscard]] static Result<ExitCode> at_end(const PoseClient::Ended& ended) {
+    if (ended.reason == 0) {
+      return fail(ErrorCode::kUnavailable, "the daemon has gone");
     }
     return ExitCode::kOk;
   }

@@ -6,7 +6,6 @@
 
 #include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
-#include <tl/expected.hpp>
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/control_client.hpp"
