@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -23,36 +24,112 @@ constexpr float kFaintestMirror = 0.004F;  // below this a reflection is not tra
 constexpr float kBrightestGlint = 1.5F;    // of white paper in the same light
 constexpr float kFaintest_nit = 1e-6F;
 
-/// How many of a pixel's rays see a mirror image that makes that share of its light.
-int mirror_rays(float share, int rays_a_pixel) {
-  constexpr float kFewest = 0.25F;
-  constexpr float kEager = 2.0F;
-  const float part = std::clamp(kEager * share, kFewest, 1.0F);
-  return static_cast<int>(std::ceil(part * static_cast<float>(rays_a_pixel)));
+/// Schlick's approximation over a cosine.
+[[gnu::always_inline]] inline float schlick(float reflectivity, float cosine) noexcept {
+  const float grazing = 1.0F - cosine;
+  const float power = grazing * grazing * grazing * grazing * grazing;
+  return reflectivity + (1.0F - reflectivity) * power;
 }
+
+/// Mirrored rays of a whole packet, of which some are wanted.
+struct Bounce {
+  std::array<int, kPacket> wanted{};
+  Lanes origin_x;
+  Lanes origin_y;
+  Lanes origin_z;
+  Lanes direction_x;
+  Lanes direction_y;
+  Lanes direction_z;
+  Lanes weight;
+  Lanes brightest_nit;
+};
 
 }  // namespace
 
 float Shader::mirror_reflectance(const Material& material, float cosine) noexcept {
-  const float grazing = 1.0F - cosine;
-  const float power = grazing * grazing * grazing * grazing * grazing;
-  const float reflectivity = material.reflectivity;
-  return reflectivity <= 0 ? 0 : reflectivity + (1.0F - reflectivity) * power;
+  return material.reflectivity <= 0 ? 0 : schlick(material.reflectivity, cosine);
 }
 
-void Shader::mirror(const Surfaces& seen, const RayPacket& packet, const Look& look,
-                    Mirrored& mirrored, LaneColours& light, LaneColours& sum) const {
+Shader::Gloss Shader::gloss_of(const Valid& valid, const Surfaces& seen) {
+  Gloss gloss;
   for (std::size_t i = 0; i < kPacket; ++i) {
-    if (seen.material[i] == nullptr) {
+    const Material* const material = seen.material[i];
+    if (valid[i] == 0 || material == nullptr) {
       continue;
     }
-    const float share = mirror_reflectance(*seen.material[i], seen.cosine[i]);
-    if (share <= kFaintestMirror) {
-      continue;
+    const float share = mirror_reflectance(*material, seen.cosine[i]);
+    gloss.share[i] = share > kFaintestMirror ? share : 0.0F;
+    gloss.roughness[i] = material->roughness;
+    gloss.received[i] = luminance(seen.irradiance[i]);
+  }
+  gloss.normal_x = seen.normal_x;
+  gloss.normal_y = seen.normal_y;
+  gloss.normal_z = seen.normal_z;
+  return gloss;
+}
+
+Shader::Gloss Shader::gloss_of(const Valid& valid, const Material& material, const Vector3f& normal,
+                               const Hits& hits, const LaneColours& irradiance) {
+  Gloss gloss;
+  gloss.roughness.fill(material.roughness);
+  gloss.normal_x.fill(normal.x());
+  gloss.normal_y.fill(normal.y());
+  gloss.normal_z.fill(normal.z());
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const float share = schlick(material.reflectivity, hits.cosine[i]);
+    gloss.share[i] = share > kFaintestMirror && valid[i] != 0 ? share : 0.0F;
+    gloss.received[i] = luminance(irradiance[i]);
+  }
+  return gloss;
+}
+
+void Shader::mirror(const Gloss& gloss, const RayPacket& packet, const Look& look,
+                    Mirrored& mirrored, LaneColours& light, LaneColours& sum) const {
+  Bounce bounce;
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    // How many of a pixel's rays see a mirror image goes by the share that it makes of its light.
+    constexpr float kFewest = 0.25F;
+    constexpr float kEager = 2.0F;
+    // Copies: GCC makes no vectors of what it loads through a constant reference in here.
+    const Gloss on = gloss;
+    const RTCRay16 ray = packet.ray;
+    const std::array<int, kPacket> order = look.order;
+    const std::uint64_t all_key = look.key;
+    const auto rays_a_pixel = static_cast<float>(look.rays_a_pixel);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const float share = on.share[i];
+      const float part = held(kEager * share, kFewest, 1.0F);
+      const int rays = -whole_below(-part * rays_a_pixel);
+      bounce.wanted[i] = share > 0.0F && order[i] < rays ? 1 : 0;
+      bounce.weight[i] = share * rays_a_pixel / static_cast<float>(rays);
+      // A lamp's image on a rough mirror is a patch of glints. One ray of a few would make a spark
+      // of each: it counts at most as much as blinds the sensor.
+      bounce.brightest_nit[i] = kBrightestGlint * on.received[i] * kInversePi / share;
+      const std::uint64_t key = subkey(all_key, i);
+      const std::uint64_t other = scramble(key);
+      float nx = on.normal_x[i] + on.roughness[i] * to_normal(key);
+      float ny = on.normal_y[i] + on.roughness[i] * to_normal(other);
+      float nz = on.normal_z[i] + on.roughness[i] * to_normal(scramble(key + 1));
+      const float inverse_n = 1.0F / std::sqrt(nx * nx + ny * ny + nz * nz);
+      nx *= inverse_n;
+      ny *= inverse_n;
+      nz *= inverse_n;
+      const float x = ray.dir_x[i];
+      const float y = ray.dir_y[i];
+      const float z = ray.dir_z[i];
+      const float inverse_d = 1.0F / std::sqrt(x * x + y * y + z * z);
+      const float twice = 2.0F * inverse_d * (x * nx + y * ny + z * nz);
+      bounce.origin_x[i] = ray.org_x[i] + ray.tfar[i] * x;
+      bounce.origin_y[i] = ray.org_y[i] + ray.tfar[i] * y;
+      bounce.origin_z[i] = ray.org_z[i] + ray.tfar[i] * z;
+      bounce.direction_x[i] = x * inverse_d - twice * nx;
+      bounce.direction_y[i] = y * inverse_d - twice * ny;
+      bounce.direction_z[i] = z * inverse_d - twice * nz;
     }
-    light[i] *= 1.0F - share;
-    const int rays = mirror_rays(share, look.rays_a_pixel);
-    if (look.order[i] >= rays) {
+  });
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    light[i] *= 1.0F - gloss.share[i];
+    if (bounce.wanted[i] == 0) {
       continue;
     }
     if (mirrored.count == kPacket) {
@@ -60,18 +137,10 @@ void Shader::mirror(const Surfaces& seen, const RayPacket& packet, const Look& l
     }
     const std::size_t to = mirrored.count++;
     mirrored.lane[to] = i;
-    mirrored.weight[to] = share * static_cast<float>(look.rays_a_pixel) / static_cast<float>(rays);
-    // A lamp's image on a rough mirror is a patch of glints. One ray of a few would make a spark of
-    // each: it counts at most as much as blinds the sensor.
-    mirrored.brightest_nit[to] =
-        kBrightestGlint * luminance(seen.irradiance[i]) * kInversePi / share;
-    const std::uint64_t key = subkey(look.key, i);
-    const Vector3f tilt{to_normal(key), to_normal(scramble(key)), to_normal(scramble(key + 1))};
-    const Vector3f normal = (Vector3f{seen.normal_x[i], seen.normal_y[i], seen.normal_z[i]} +
-                             seen.material[i]->roughness * tilt)
-                                .normalized();
-    const Vector3f incoming = direction_of(packet, i).normalized();
-    aim(mirrored.packet, to, end_of(packet, i), incoming - 2.0F * incoming.dot(normal) * normal);
+    mirrored.weight[to] = bounce.weight[i];
+    mirrored.brightest_nit[to] = bounce.brightest_nit[i];
+    aim(mirrored.packet, to, {bounce.origin_x[i], bounce.origin_y[i], bounce.origin_z[i]},
+        {bounce.direction_x[i], bounce.direction_y[i], bounce.direction_z[i]});
     mirrored.packet.ray.time[to] = packet.ray.time[i];
   }
 }
@@ -85,13 +154,22 @@ void Shader::add_mirrored(const Look& look, Mirrored& mirrored, LaneColours& sum
   RayPacket& packet = mirrored.packet;
   RayScene::renew(packet);
   rays_->trace(valid, packet);
-  const Surfaces image =
-      surfaces(valid, packet,
-               {.footprint_per_t = 2.0F * look.footprint_per_t, .rays_a_pixel = look.rays_a_pixel});
+  const Look from_afar{.footprint_per_t = 2.0F * look.footprint_per_t,
+                       .rays_a_pixel = look.rays_a_pixel};
+  LaneColours lights;
+  if (const unsigned index = only_patch(valid, packet); index != kNoPatch) {
+    LaneColours irradiance;
+    light_of_patch(index, meet(scene_->patches[index], packet, from_afar, 0), from_afar, irradiance,
+                   lights);
+  } else {
+    const Surfaces image = surfaces(valid, packet, from_afar);
+    for (std::size_t i = 0; i < mirrored.count; ++i) {
+      lights[i] = light_of(image, packet, i);
+    }
+  }
   for (std::size_t i = 0; i < mirrored.count; ++i) {
-    Rgb light = light_of(image, packet, i);
-    light *= std::min(1.0F, mirrored.brightest_nit[i] / std::max(luminance(light), kFaintest_nit));
-    sum[mirrored.lane[i]] += light * mirrored.weight[i];
+    const float most = mirrored.brightest_nit[i] / std::max(luminance(lights[i]), kFaintest_nit);
+    sum[mirrored.lane[i]] += lights[i] * (std::min(1.0F, most) * mirrored.weight[i]);
   }
   mirrored.count = 0;
 }

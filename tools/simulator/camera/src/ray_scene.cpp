@@ -11,9 +11,11 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <embree3/rtcore.h>
 
 #include "geoflow/hal/result.hpp"
+#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/candidates.hpp"
@@ -84,6 +86,12 @@ void set_facets(RTCGeometry geometry, std::size_t capsules) {
       }
     }
   }
+}
+
+/// A box about a ball, with room for rounding.
+Eigen::AlignedBox3f around(const Vector3f& centre, float radius_m) {
+  const Vector3f half = Vector3f::Constant(radius_m + kNear_m);
+  return {centre - half, centre + half};
 }
 
 void attach(RTCScene scene, RTCGeometry geometry, HitKind kind) {
@@ -179,10 +187,21 @@ void RayScene::move_people(double begin_s, double end_s) {
   people_begin_s_ = begin_s;
   people_end_s_ = end_s;
   people_travel_m_ = 0;
+  people_boxes_.clear();
   std::size_t next = 0;
   for (const Pedestrian& person : scene_->pedestrians) {
     const auto begin = person.body(begin_s);
     const auto end = person.body(end_s);
+    // Corners move straight from one place to the other.
+    Eigen::AlignedBox3f box;
+    for (const auto& body : {begin, end}) {
+      for (const Capsule& capsule : body) {
+        box.extend(around(capsule.start, capsule.start_radius_m));
+        box.extend(around(capsule.end, capsule.end_radius_m));
+      }
+    }
+    people_boxes_.push_back({.low_m = {box.min().x(), box.min().y(), box.min().z()},
+                             .high_m = {box.max().x(), box.max().y(), box.max().z()}});
     for (std::size_t i = 0; i < begin.size(); ++i, ++next) {
       write_capsule(begin[i], people_vertices_[0] + 3 * kCorners * next);
       write_capsule(end[i], people_vertices_[1] + 3 * kCorners * next);
@@ -233,9 +252,47 @@ void RayScene::renew(RayPacket& packet) {
 
 void RayScene::trace(const Valid& valid, RayPacket& packet) const {
   intersect(standing_.get(), valid, packet);
-  if (walking_) {
-    intersect(walking_.get(), valid, packet);
+  meet_people(valid, packet);
+}
+
+void RayScene::meet_people(const Valid& valid, RayPacket& packet) const {
+  if (!walking_) {
+    return;
   }
+  const Valid near = near_people(valid, packet);
+  if (std::ranges::find(near, -1) != near.end()) {
+    intersect(walking_.get(), near, packet);
+  }
+}
+
+Valid RayScene::near_people(const Valid& valid, const RayPacket& packet) const {
+  Valid near{};
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    // Copies: GCC makes no vectors of what it loads through a constant reference in here.
+    const RTCRay16 ray = packet.ray;
+    const Valid counts = valid;
+    std::array<int, kPacket> found{};
+    for (const Box& box : people_boxes_) {
+      for (std::size_t i = 0; i < kPacket; ++i) {
+        float enters = ray.tnear[i];
+        float leaves = ray.tfar[i];
+        const auto pass = [&](float from, float along, float low, float high)
+                              __attribute__((always_inline)) {
+                                const float inverse = 1.0F / along;
+                                const float to_low = (low - from) * inverse;
+                                const float to_high = (high - from) * inverse;
+                                enters = std::max(enters, std::min(to_low, to_high));
+                                leaves = std::min(leaves, std::max(to_low, to_high));
+                              };
+        pass(ray.org_x[i], ray.dir_x[i], box.low_m[0], box.high_m[0]);
+        pass(ray.org_y[i], ray.dir_y[i], box.low_m[1], box.high_m[1]);
+        pass(ray.org_z[i], ray.dir_z[i], box.low_m[2], box.high_m[2]);
+        found[i] |= enters <= leaves ? counts[i] : 0;
+      }
+    }
+    near = found;
+  });
+  return near;
 }
 
 void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
@@ -247,10 +304,15 @@ void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
   for (const std::uint32_t patch : candidates.patches()) {
     flats_[patch].stop(patch, packet);
   }
-  if (candidates.nothing()) {
-    return;
+  if (!candidates.nothing()) {
+    trace_gaps(valid, packet);
   }
-  // Between two patches that touch, rounding may let a ray through.
+  if (candidates.people()) {
+    meet_people(valid, packet);
+  }
+}
+
+void RayScene::trace_gaps(const Valid& valid, RayPacket& packet) const {
   Valid left = valid;
   bool any = false;
   for (std::size_t i = 0; i < kPacket; ++i) {
@@ -258,7 +320,7 @@ void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
     any = any || left[i] != 0;
   }
   if (any) {
-    trace(left, packet);
+    trace_static(left, packet);
   }
 }
 

@@ -76,6 +76,11 @@ class RayScene {
   void add_patches();
   void add_capsules();
   void add_people();
+  /// Lets those of the rays that come near a person end on them.
+  void meet_people(const Valid& valid, RayPacket& packet) const;
+  /// Traces what has met no patch yet: between two that touch, rounding may let a ray through.
+  void trace_gaps(const Valid& valid, RayPacket& packet) const;
+  [[nodiscard]] Valid near_people(const Valid& valid, const RayPacket& packet) const;
 
   const Scene* scene_;
   std::vector<Flat> flats_;  ///< of the patches
@@ -86,7 +91,13 @@ class RayScene {
   double people_begin_s_ = 0;
   double people_end_s_ = 0;
   float people_travel_m_ = 0;  ///< between the two
+  /// What a person stays within while they are moved.
+  struct Box {
+    std::array<float, 3> low_m;
+    std::array<float, 3> high_m;
+  };
   std::vector<Capsule> people_begin_;
+  std::vector<Box> people_boxes_;
   std::array<float*, 2> people_vertices_{};  ///< Embree's buffers for ray time 0 and 1
 };
 

@@ -290,11 +290,10 @@ Rgb Shader::light_of(const Surfaces& seen, const RayPacket& packet, std::size_t 
          (seen.irradiance[lane] * kInversePi + seen.material[lane]->emission_nit);
 }
 
-bool Shader::shade_one_patch(const Valid& valid, const RayPacket& packet, const Look& look,
-                             LaneColours& sum) const {
+unsigned Shader::only_patch(const Valid& valid, const RayPacket& packet) {
   const auto first = static_cast<std::size_t>(std::ranges::find(valid, -1) - valid.begin());
   if (first == kPacket || packet.hit.geomID[first] != static_cast<unsigned>(HitKind::kPatch)) {
-    return false;
+    return kNoPatch;
   }
   const unsigned index = packet.hit.primID[first];
   unsigned others = 0;
@@ -303,25 +302,43 @@ bool Shader::shade_one_patch(const Valid& valid, const RayPacket& packet, const 
     others |= valid[i] != 0 ? other : 0U;
   }
   static_assert(static_cast<unsigned>(HitKind::kPatch) == 0);
+  return others == 0 ? index : kNoPatch;
+}
+
+void Shader::light_of_patch(unsigned index, const Hits& hits, const Look& look,
+                            LaneColours& irradiance, LaneColours& light) const {
   const Patch& patch = scene_->patches[index];
   const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
-  if (others != 0 || material.reflectivity > 0) {
-    return false;
-  }
-  const Hits hits = meet(patch, packet, look, first);
-  LaneColours light;
   LaneColours albedo;
   Lanes contrast{};
-  light_and_paint(index, hits, look, light, albedo, contrast);
+  light_and_paint(index, hits, look, irradiance, albedo, contrast);
   for (std::size_t i = 0; i < kPacket; ++i) {
-    sum[i] += albedo[i] * (light[i] * kInversePi + material.emission_nit);
+    light[i] = albedo[i] * (irradiance[i] * kInversePi + material.emission_nit);
   }
-  return true;
+}
+
+void Shader::shade_patch(unsigned index, const Valid& valid, const RayPacket& packet,
+                         const Look& look, Mirrored& mirrored, LaneColours& sum) const {
+  const Patch& patch = scene_->patches[index];
+  const Material& material = scene_->materials[static_cast<std::size_t>(patch.material)];
+  const auto first = static_cast<std::size_t>(std::ranges::find(valid, -1) - valid.begin());
+  const Hits hits = meet(patch, packet, look, first);
+  LaneColours irradiance;
+  LaneColours light;
+  light_of_patch(index, hits, look, irradiance, light);
+  if (material.reflectivity > 0) {
+    mirror(gloss_of(valid, material, hits.facing * patch.normal(), hits, irradiance), packet, look,
+           mirrored, light, sum);
+  }
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    sum[i] += light[i];
+  }
 }
 
 void Shader::shade(const Valid& valid, const RayPacket& packet, const Look& look,
                    Mirrored& mirrored, LaneColours& sum) const {
-  if (shade_one_patch(valid, packet, look, sum)) {
+  if (const unsigned index = only_patch(valid, packet); index != kNoPatch) {
+    shade_patch(index, valid, packet, look, mirrored, sum);
     return;
   }
   const Surfaces seen = surfaces(valid, packet, look);
@@ -334,7 +351,7 @@ void Shader::shade(const Valid& valid, const RayPacket& packet, const Look& look
     }
   }
   if (mirrors) {
-    mirror(seen, packet, look, mirrored, light, sum);
+    mirror(gloss_of(valid, seen), packet, look, mirrored, light, sum);
   }
   for (std::size_t i = 0; i < kPacket; ++i) {
     sum[i] += light[i];

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <embree3/rtcore.h>
+
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
@@ -77,6 +79,7 @@ class Shader {
   [[nodiscard]] static float mirror_reflectance(const Material& material, float cosine) noexcept;
 
  private:
+  static constexpr unsigned kNoPatch = RTC_INVALID_GEOMETRY_ID;
   struct Person {
     Eigen::Vector2f position;
     Eigen::Vector2f shadow;  ///< from the feet to the head's shadow [m]
@@ -104,10 +107,29 @@ class Shader {
              Lanes& contrast) const;
   void dim_by_people(const Hits& hits, LaneColours& irradiance) const;
   [[nodiscard]] Rgb light_of(const Surfaces& seen, const RayPacket& packet, std::size_t lane) const;
-  [[nodiscard]] bool shade_one_patch(const Valid& valid, const RayPacket& packet, const Look& look,
-                                     LaneColours& sum) const;
-  void mirror(const Surfaces& seen, const RayPacket& packet, const Look& look, Mirrored& mirrored,
+  void shade_patch(unsigned index, const Valid& valid, const RayPacket& packet, const Look& look,
+                   Mirrored& mirrored, LaneColours& sum) const;
+  /// Of where a packet's rays are mirrored.
+  struct Gloss {
+    Lanes share{};  ///< of the light, that comes from the mirror; 0: none worth tracing
+    Lanes roughness{};
+    Lanes normal_x{};  ///< unit, towards the viewer
+    Lanes normal_y{};
+    Lanes normal_z{};
+    Lanes received{};  ///< luminance of the light that falls there [lux]
+  };
+  [[nodiscard]] static Gloss gloss_of(const Valid& valid, const Surfaces& seen);
+  [[nodiscard]] static Gloss gloss_of(const Valid& valid, const Material& material,
+                                      const Eigen::Vector3f& normal, const Hits& hits,
+                                      const LaneColours& irradiance);
+  /// Takes the mirrors' shares out of `light`, and leaves their rays in `mirrored`.
+  void mirror(const Gloss& gloss, const RayPacket& packet, const Look& look, Mirrored& mirrored,
               LaneColours& light, LaneColours& sum) const;
+  /// The patch that all valid lanes hit; kNoPatch: none, or several.
+  [[nodiscard]] static unsigned only_patch(const Valid& valid, const RayPacket& packet);
+  /// Luminance [cd/m^2] without mirrors of lanes that hit one patch; `irradiance` on it [lux].
+  void light_of_patch(unsigned index, const Hits& hits, const Look& look, LaneColours& irradiance,
+                      LaneColours& light) const;
 
   const Scene* scene_;
   const RayScene* rays_;

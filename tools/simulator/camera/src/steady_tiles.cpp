@@ -41,7 +41,9 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
       walk_m_{rays.people_travel_m(0.5 * shutter.exposure_s)},
       moves_{shutter.exposure_s > 0},
       anything_{columns_ + 1, rows_ + 1},
+      anyone_{columns_ + 1, rows_ + 1},
       depths_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)),
+      people_(depths_.size()),
       centre_(depths_.size()),
       seen_(depths_.size()) {
   for (int row = 0; row < rows_; ++row) {
@@ -53,9 +55,11 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
     }
     glances_.push_back(glances);
   }
-  join_corners(look_at_corners(rays, shutter));
+  join_corners(look_at_corners(rays));
   add_outlines(rays);
+  add_people(rays);
   spread();
+  spread_people();
 }
 
 int SteadyTiles::at(const Tile& tile) const noexcept {
@@ -66,8 +70,7 @@ int SteadyTiles::at(const Tile& tile) const noexcept {
   return may.one_patch() ? static_cast<int>(may.patches().front()) : kMixed;
 }
 
-std::vector<SteadyTiles::Sight> SteadyTiles::look_at_corners(const RayScene& rays,
-                                                             const Shutter& shutter) const {
+std::vector<SteadyTiles::Sight> SteadyTiles::look_at_corners(const RayScene& rays) const {
   const int across = columns_ + 1;
   std::vector<Sight> corners(static_cast<std::size_t>(across) *
                              static_cast<std::size_t>(rows_ + 1));
@@ -81,10 +84,8 @@ std::vector<SteadyTiles::Sight> SteadyTiles::look_at_corners(const RayScene& ray
       aim(packet, i, view.p_world_cam,
           view.R_world_cam * pinhole_.direction(static_cast<float>(tile.x(i) * kTile) - 0.5F,
                                                 static_cast<float>(tile.y(i) * kTile) - 0.5F));
-      packet.ray.time[i] =
-          rays.ray_time(shutter.row_mid_s(std::min(row * kTile + kTile / 2, shutter.rows - 1)));
     }
-    rays.trace(tile.valid, packet);
+    rays.trace_static(tile.valid, packet);
     for (std::size_t i = 0; i < kPacket; ++i) {
       if (tile.valid[i] == 0) {
         continue;
@@ -115,8 +116,7 @@ void SteadyTiles::join_corners(const std::vector<Sight>& corners) {
       const std::size_t first = here + static_cast<std::size_t>(row);
       for (const std::size_t corner : {first, first + 1, first + across, first + across + 1}) {
         centre_[here].add(corners[corner].seen);
-        depths_[here].nearest_m = std::min(depths_[here].nearest_m, corners[corner].depth_m);
-        depths_[here].farthest_m = std::max(depths_[here].farthest_m, corners[corner].depth_m);
+        depths_[here].add(corners[corner].depth_m);
       }
     }
   }
@@ -144,12 +144,20 @@ void SteadyTiles::add_outlines(const RayScene& rays) {
     outlines.of(capsule, 0, crossings);
     see([&](std::size_t tile) { centre_[tile].add_anything(); });
   }
-  for (std::size_t i = 0; i < scene.pedestrians.size() * Pedestrian::kCapsules; ++i) {
+}
+
+void SteadyTiles::add_people(const RayScene& rays) {
+  const Outlines outlines{pinhole_, middles_, columns_};
+  std::vector<Outlines::Crossing> crossings;
+  for (std::size_t i = 0; i < rays.scene().pedestrians.size() * Pedestrian::kCapsules; ++i) {
     outlines.of(rays.person_capsule(i), rays.people_travel_m(), crossings);
-    see([&](std::size_t tile) {
-      centre_[tile].add_anything();
-      depths_[tile].walk_m = walk_m_;
-    });
+    for (const auto& [tile, depth_m] : crossings) {
+      if (depth_m <= kBehind * depths_[tile].farthest_m) {
+        people_[tile].add(depth_m);
+        people_[tile].walk_m = walk_m_;
+      }
+    }
+    crossings.clear();
   }
 }
 
@@ -159,7 +167,9 @@ void SteadyTiles::spread() {
                 .walk_m = walk_m_};
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
-      beyond.nearest_m = std::min(beyond.nearest_m, depths_[index(column, row)].nearest_m);
+      const std::size_t here = index(column, row);
+      beyond.nearest_m =
+          std::min({beyond.nearest_m, depths_[here].nearest_m, people_[here].nearest_m});
     }
     mark_row(row, 0, columns_ - 1, [&](int column) {
       const std::size_t here = index(column, row);
@@ -179,7 +189,19 @@ void SteadyTiles::spread() {
       mark_row(row, columns_, columns_, from_beyond);
     }
   }
-  take_anything();
+  for_each_covered(anything_, [](Candidates& seen) { seen.add_anything(); });
+}
+
+void SteadyTiles::spread_people() {
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      const Depths& people = people_[index(column, row)];
+      if (people.seen()) {
+        anyone_.add(within(row, column, column, reach(column, row, people)));
+      }
+    }
+  }
+  for_each_covered(anyone_, [](Candidates& seen) { seen.add_people(); });
 }
 
 template <typename SpreadOf>
@@ -232,35 +254,39 @@ SteadyTiles::Reach SteadyTiles::reach(int column, int row, const Depths& depths)
 }
 
 void SteadyTiles::mark(int row, int first, int last, const Spread& spread) {
-  const Reach& reach = spread.reach;
-  const int top = std::max(0, row - reach.up);
-  const int bottom = std::min(rows_ - 1, row + reach.down);
-  const int left = std::max(0, first - reach.left);
-  const int right = std::min(columns_ - 1, last + reach.right);
-  if (spread.seen.anything() && top <= bottom && left <= right) {
-    // Whatever else these tiles may see does not matter; their sum is taken once.
-    anything_.at(left, top) += 1;
-    anything_.at(right + 1, top) -= 1;
-    anything_.at(left, bottom + 1) -= 1;
-    anything_.at(right + 1, bottom + 1) += 1;
+  const Rectangle reached = within(row, first, last, spread.reach);
+  if (reached.empty()) {
     return;
   }
-  for (int y = top; y <= bottom; ++y) {
-    for (int x = left; x <= right; ++x) {
+  if (spread.seen.anything()) {
+    // Whatever else these tiles may see does not matter; their sum is taken once.
+    anything_.add(reached);
+    return;
+  }
+  for (int y = reached.top; y <= reached.bottom; ++y) {
+    for (int x = reached.left; x <= reached.right; ++x) {
       seen_[index(x, y)].add(spread.seen);
     }
   }
 }
 
-void SteadyTiles::take_anything() {
+SteadyTiles::Rectangle SteadyTiles::within(int row, int first, int last, const Reach& reach) const {
+  return {.left = std::max(0, first - reach.left),
+          .right = std::min(columns_ - 1, last + reach.right),
+          .top = std::max(0, row - reach.up),
+          .bottom = std::min(rows_ - 1, row + reach.down)};
+}
+
+template <typename Add>
+void SteadyTiles::for_each_covered(Cover& cover, const Add& add) {
   for (int y = 0; y < rows_; ++y) {
     int along = 0;
     for (int x = 0; x < columns_; ++x) {
-      along += anything_.at(x, y);
-      int& sum = anything_.at(x, y);
-      sum = along + (y > 0 ? anything_.at(x, y - 1) : 0);
+      along += cover.at(x, y);
+      int& sum = cover.at(x, y);
+      sum = along + (y > 0 ? cover.at(x, y - 1) : 0);
       if (sum > 0) {
-        seen_[index(x, y)].add_anything();
+        add(seen_[index(x, y)]);
       }
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -32,10 +33,10 @@ struct Shutter {
 /// In the middle of its row's exposure, a tile may see what rays through its corners meet, and
 /// whatever has an outline in it that is not behind all of that. It stays within its reach during
 /// the exposure: where the camera's motion, at the tile's nearest and farthest depth, and a
-/// walker's own take it in the image. What a tile may see is what has it in reach. Round things are
-/// left to tracing. Beyond the image anything may be, but nothing nearer than the nearest that the
-/// image shows. What comes out from behind something and is not seen before in its
-/// neighbourhood may be missed.
+/// walker's own take it in the image. What a tile may see is what has it in reach. People are
+/// looked for apart from what stands still behind them. Round things are left to tracing. Beyond
+/// the image anything may be, but nothing nearer than the nearest that the image shows. What comes
+/// out from behind something and is not seen before in its neighbourhood may be missed.
 class SteadyTiles {
  public:
   static constexpr int kMixed = -1;
@@ -70,11 +71,26 @@ class SteadyTiles {
     Candidates seen;
     [[nodiscard]] bool operator==(const Spread&) const = default;
   };
-  /// What a tile sees lies between the two, and moves by itself by `walk_m`.
+  /// What a tile sees lies between the two, and moves by itself by `walk_m`. Nothing is farther
+  /// than it is near.
   struct Depths {
     float nearest_m = std::numeric_limits<float>::infinity();
     float farthest_m = 0;
     float walk_m = 0;
+
+    void add(float depth_m) noexcept {
+      nearest_m = std::min(nearest_m, depth_m);
+      farthest_m = std::max(farthest_m, depth_m);
+    }
+    [[nodiscard]] bool seen() const noexcept { return nearest_m <= farthest_m; }
+  };
+  /// Tiles of the image, ends included; none if it ends before it begins.
+  struct Rectangle {
+    int left = 0;
+    int right = 0;
+    int top = 0;
+    int bottom = 0;
+    [[nodiscard]] bool empty() const noexcept { return right < left || bottom < top; }
   };
   /// A number for each tile and for one more row and column: how many rectangles cover it, as
   /// differences between neighbours (Crow, "Summed-area tables for texture mapping", 1984).
@@ -83,6 +99,12 @@ class SteadyTiles {
     Cover(int columns, int rows)
         : columns_{columns},
           counts_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {}
+    void add(const Rectangle& covered) noexcept {
+      at(covered.left, covered.top) += 1;
+      at(covered.right + 1, covered.top) -= 1;
+      at(covered.left, covered.bottom + 1) -= 1;
+      at(covered.right + 1, covered.bottom + 1) += 1;
+    }
     [[nodiscard]] int& at(int column, int row) noexcept {
       return counts_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
                      static_cast<std::size_t>(column)];
@@ -100,11 +122,12 @@ class SteadyTiles {
   /// Where a row of tiles looks at some moments of its exposure.
   using Glances = std::vector<View>;
 
-  [[nodiscard]] std::vector<Sight> look_at_corners(const RayScene& rays,
-                                                   const Shutter& shutter) const;
+  [[nodiscard]] std::vector<Sight> look_at_corners(const RayScene& rays) const;
   void join_corners(const std::vector<Sight>& corners);
   void add_outlines(const RayScene& rays);
+  void add_people(const RayScene& rays);
   void spread();
+  void spread_people();
   [[nodiscard]] Reach reach(int column, int row, const Depths& depths) const;
   /// Spreads what `spread_of(column)` says of a row's tiles `first` to `last`, equal neighbours
   /// together.
@@ -112,8 +135,11 @@ class SteadyTiles {
   void mark_row(int row, int first, int last, const SpreadOf& spread_of);
   /// Adds what tiles `first` to `last` of a row all have in them to the tiles in their reach.
   void mark(int row, int first, int last, const Spread& spread);
-  /// Lets the tiles see anything that were marked so.
-  void take_anything();
+  /// The tiles of the image that tiles `first` to `last` of a row reach.
+  [[nodiscard]] Rectangle within(int row, int first, int last, const Reach& reach) const;
+  /// Calls `add` with all tiles that a rectangle covers.
+  template <typename Add>
+  void for_each_covered(Cover& cover, const Add& add);
 
   int columns_;
   int rows_;
@@ -121,9 +147,11 @@ class SteadyTiles {
   float walk_m_;                    ///< how far people move during half the exposure
   bool moves_;                      ///< is there time for anything to move in?
   Cover anything_;                  ///< of what may see anything
+  Cover anyone_;                    ///< of what may see people
   std::vector<View> middles_;       ///< of each row of tiles, in the middle of its exposure
   std::vector<Glances> glances_;    ///< of each row of tiles
-  std::vector<Depths> depths_;      ///< of each tile
+  std::vector<Depths> depths_;      ///< of each tile: of what stands still
+  std::vector<Depths> people_;      ///< likewise of people; of none, not seen()
   std::vector<Candidates> centre_;  ///< what each tile may see in the middle of its exposure
   std::vector<Candidates> seen_;
 };

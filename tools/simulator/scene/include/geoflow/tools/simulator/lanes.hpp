@@ -54,19 +54,37 @@ template <typename Body>
 [[gnu::target("avx2,fma"), gnu::noinline]] void run_with_avx2(const Body& body) {
   body();
 }
+template <typename Body>
+[[gnu::target("avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,prefer-vector-width=512"),
+  gnu::noinline]] void
+run_with_avx512(const Body& body) {
+  body();
+}
+enum class Vectors : std::uint8_t { kFour, kEight, kSixteen };
+/// The widest that the machine has.
+inline Vectors widest_vectors() noexcept {
+  const bool eight = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  const bool sixteen =
+      eight && __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+      __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
+  return sixteen ? Vectors::kSixteen : (eight ? Vectors::kEight : Vectors::kFour);
+}
 }  // namespace detail
 #endif
 
-/// Runs `body()` compiled for AVX2 where the machine has it, so that one program uses eight lanes
-/// where it can. What `body` calls must be inlined into it, and it must itself be declared
-/// `__attribute__((always_inline))`. Results may differ in the last bit between machines with and
-/// without (fused multiplication), not between runs on one.
+/// Runs `body()` compiled for AVX-512 or AVX2 where the machine has it, so that one program uses
+/// sixteen or eight lanes where it can. What `body` calls must be inlined into it, and it must
+/// itself be declared `__attribute__((always_inline))`. Results may differ in the last bit between
+/// machines with and without either (fused multiplication), not between runs on one.
 template <typename Body>
 void with_wide_vectors(const Body& body) {
 #ifdef __x86_64__
-  static const bool wide =
-      __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  if (wide) {
+  static const detail::Vectors vectors = detail::widest_vectors();
+  if (vectors == detail::Vectors::kSixteen) {
+    detail::run_with_avx512(body);
+    return;
+  }
+  if (vectors == detail::Vectors::kEight) {
     detail::run_with_avx2(body);
     return;
   }

@@ -44,7 +44,7 @@ namespace geoflow::simulator {
   constexpr float kInverseDeviation = 1.0F / 37837.2F;  // sqrt(4 (65536^2 - 1) / 12)
   const std::uint64_t sum =
       (bits & kPart) + ((bits >> 16U) & kPart) + ((bits >> 32U) & kPart) + (bits >> 48U);
-  return (static_cast<float>(sum) - kMean) * kInverseDeviation;
+  return (static_cast<float>(static_cast<int>(sum)) - kMean) * kInverseDeviation;
 }
 
 /// A bijective scrambling of 32 bits, for loops over many pixels at once (C. Wellons, "Prospecting
