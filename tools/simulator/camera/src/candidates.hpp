@@ -17,7 +17,7 @@ class Candidates {
 
   constexpr void add_patch(std::uint32_t patch) noexcept {
     const auto known = patches();
-    if (std::find(known.begin(), known.end(), patch) != known.end()) {
+    if (std::ranges::find(known, patch) != known.end()) {
       return;
     }
     if (count_ == kMost) {

@@ -31,8 +31,8 @@ constexpr float kFaintest_nit = 1e-6F;
   return reflectivity + (1.0F - reflectivity) * power;
 }
 
-/// Mirrored rays of a whole packet, of which some are wanted.
-struct Bounce {
+/// Mirrored rays of a whole packet, of which some are wanted; the others' lanes are not set.
+struct Bounce {  // NOLINT(cppcoreguidelines-pro-type-member-init)
   std::array<int, kPacket> wanted{};
   Lanes origin_x;
   Lanes origin_y;

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <numbers>
 
 #include "geoflow/tools/simulator/lanes.hpp"
-#include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/simulator/texture.hpp"
 

@@ -52,7 +52,7 @@ class Shader {
     std::array<int, kPacket> order{};
   };
   /// Mirrored rays, of some of a tile's packets, whose light is still to be added.
-  struct Mirrored {
+  struct Mirrored {    // NOLINT(cppcoreguidelines-pro-type-member-init)
     RayPacket packet;  ///< set as far as `count`
     std::size_t count = 0;
     std::array<std::size_t, kPacket> lane{};  ///< of the ray that was mirrored

@@ -55,9 +55,8 @@ template <typename Body>
   body();
 }
 template <typename Body>
-[[gnu::target("avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,prefer-vector-width=512"),
-  gnu::noinline]] void
-run_with_avx512(const Body& body) {
+[[gnu::target("avx2,fma,avx512f,avx512bw,avx512dq,avx512vl"), gnu::noinline]] void run_with_avx512(
+    const Body& body) {
   body();
 }
 enum class Vectors : std::uint8_t { kFour, kEight, kSixteen };
