@@ -169,37 +169,36 @@ TEST_F(GeoflowdService, WaitsForACameraThatIsNotThere) {
   EXPECT_THAT(process.err(), HasSubstr("it is waited for"));
 }
 
-/// The kernel's number of the process's thread of that name; 0 where it has none.
-pid_t find_thread(pid_t process, const std::string& name) {
+/// The kernel's numbers of the process's threads of that name. A thread's pools have its name as
+/// well.
+std::vector<pid_t> find_threads(pid_t process, const std::string& name) {
   const auto tasks = std::filesystem::path{"/proc"} / std::to_string(process) / "task";
+  std::vector<pid_t> threads;
   for (const auto& task : std::filesystem::directory_iterator{tasks}) {
     std::ifstream file{task.path() / "comm"};
     std::string found;
     std::getline(file, found);
     if (found == name) {
-      return static_cast<pid_t>(std::stol(task.path().filename()));
+      threads.push_back(static_cast<pid_t>(std::stol(task.path().filename())));
     }
   }
-  return 0;
+  return threads;
 }
 
-/// Stops one thread of a process, as a debugger does, and leaves the others. 0, with errno, where
-/// that is not allowed.
-pid_t stop_thread(pid_t process, const std::string& name) {
-  const HostTime deadline = HostClock::now() + seconds{60};
-  while (HostClock::now() < deadline) {
-    const pid_t thread = find_thread(process, name);
+/// Stops the threads of that name, as a debugger does, and leaves the others. Those that it has
+/// stopped; none, with errno, where that is not allowed.
+std::vector<pid_t> stop_threads(pid_t process, const std::string& name) {
+  std::vector<pid_t> stopped;
+  errno = ESRCH;
+  for (const pid_t thread : find_threads(process, name)) {
     int status = 0;
-    if (thread != 0 && ::ptrace(PTRACE_SEIZE, thread, nullptr, nullptr) != 0 && errno == EPERM) {
-      return 0;
-    }
-    if (thread != 0 && ::ptrace(PTRACE_INTERRUPT, thread, nullptr, nullptr) == 0 &&
+    if (::ptrace(PTRACE_SEIZE, thread, nullptr, nullptr) == 0 &&
+        ::ptrace(PTRACE_INTERRUPT, thread, nullptr, nullptr) == 0 &&
         ::waitpid(thread, &status, __WALL) == thread && WIFSTOPPED(status)) {
-      return thread;
+      stopped.push_back(thread);
     }
   }
-  errno = ESRCH;
-  return 0;
+  return stopped;
 }
 
 class StuckThread : public GeoflowdService, public testing::WithParamInterface<const char*> {};
@@ -211,17 +210,19 @@ TEST_P(StuckThread, StarvesTheWatchdogUntilItMovesAgain) {
       log("daemon")};
   ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
   ASSERT_TRUE(manager_.wait_for("WATCHDOG=1"));
-  const pid_t thread = stop_thread(process.pid(), GetParam());
-  if (thread == 0 && errno == EPERM) {
+  const std::vector<pid_t> threads = stop_threads(process.pid(), GetParam());
+  if (threads.empty() && errno == EPERM) {
     GTEST_SKIP() << "ptrace is not allowed here";
   }
-  ASSERT_NE(thread, 0) << std::generic_category().message(errno);
+  ASSERT_FALSE(threads.empty()) << std::generic_category().message(errno);
   bool starved = false;
   for (int i = 0; i < 100 && !starved; ++i) {
     starved = manager_.is_silent_of("WATCHDOG=1", seconds{3});
   }
   EXPECT_TRUE(starved) << process.err();
-  ASSERT_EQ(::ptrace(PTRACE_DETACH, thread, nullptr, nullptr), 0);
+  for (const pid_t thread : threads) {
+    ASSERT_EQ(::ptrace(PTRACE_DETACH, thread, nullptr, nullptr), 0);
+  }
   EXPECT_TRUE(manager_.wait_for("WATCHDOG=1")) << process.err();
 }
 
