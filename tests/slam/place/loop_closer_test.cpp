@@ -38,6 +38,7 @@ class LoopCloserOnALine : public testing::Test {
   static constexpr std::size_t kEnd = 40;
   static constexpr double kStepM = 0.1;
   static constexpr double kDriftM = 0.1;
+  static constexpr double kSigma = 0.01;  ///< of a loop [rad], [m]
 
   void SetUp() override {
     for (std::size_t i = 0; i <= 2 * kEnd; ++i) {
@@ -55,8 +56,11 @@ class LoopCloserOnALine : public testing::Test {
     const SE3& T_odom_old = map_.keyframe(id_of(old)).T_odom_cam;
     const SE3& T_odom_new = map_.keyframe(id_of(i)).T_odom_cam;
     const SE3 T_new_new1{so3::exp({0, 0, 0}), {0, -drift_m, 0}};
-    return {{{.edge = {id_of(old), id_of(i), T_odom_old.inverse() * T_odom_new * T_new_new1,
-                       Matrix6d::Identity()},
+    return {{{.edge = {.from = id_of(old),
+                       .to = id_of(i),
+                       .T_from_to = T_odom_old.inverse() * T_odom_new * T_new_new1,
+                       .information = Matrix6d::Identity() / (kSigma * kSigma),
+                       .kind = EdgeKind::kLoop},
               .certain = certain}}};
   }
 
@@ -85,6 +89,12 @@ TEST_F(LoopCloserOnALine, BelievesNoThreeThatDisagreeOrAreFarBetween) {
 
 TEST_F(LoopCloserOnALine, BelievesOneThatIsCertain) {
   EXPECT_EQ(closer_.consider(map_, found(70, kDriftM, true)).size(), 1U);
+}
+
+/// Over less than a metre odometry errs less than a view that is compared with another.
+TEST_F(LoopCloserOnALine, BelievesNoneOverAWayThatOdometryKnowsBetter) {
+  EXPECT_TRUE(closer_.consider(map_, found(44, kDriftM, true)).empty());
+  EXPECT_EQ(closer_.consider(map_, found(50, kDriftM, true)).size(), 1U);
 }
 
 TEST_F(LoopCloserOnALine, BelievesNothingThatNoOdometryDrifts) {
