@@ -4,7 +4,7 @@
 - A part includes and links only the parts that the table gives it; rooms of one part see each other.
 - A third-party library is included only in its rooms, and linked only by a part that has such a room.
 - Threads and locks stand only in the files named for them, <iostream> only in tools and tests.
-- slam and timesync read no clock: time is an argument.
+- slam, calibration and timesync read no clock: time is an argument.
 """
 import os
 import re

@@ -7,14 +7,15 @@ PARTS = {
     "timesync": {"timesync", "hal"},
     "drivers": {"drivers", "hal"},
     "slam": {"slam", "hal"},
+    "calibration": {"calibration", "hal"},
     "daemon": {"daemon", "slam", "drivers", "timesync", "hal"},
-    "tools": {"tools", "daemon", "slam", "drivers", "timesync", "hal"},
+    "tools": {"tools", "daemon", "calibration", "slam", "drivers", "timesync", "hal"},
     "clients": {"clients", "daemon"},  # of the daemon the protocol's header alone
-    "tests": {"tests", "clients", "tools", "daemon", "slam", "drivers", "timesync", "hal"},
+    "tests": {"tests", "clients", "tools", "daemon", "calibration", "slam", "drivers", "timesync", "hal"},
 }
 
 # Parts to which time is an argument.
-CLOCKLESS = {"slam", "timesync"}
+CLOCKLESS = {"slam", "timesync", "calibration"}
 
 # Benchmarks measure the insides of other parts, and so, like tests, may see their private headers.
 MEASURING_ROOMS = ("tools/bench",)
@@ -30,7 +31,7 @@ class Library:
     rooms: tuple
 
 
-EVERYWHERE = ("hal", "timesync", "drivers", "slam", "daemon", "tools")
+EVERYWHERE = ("hal", "timesync", "drivers", "slam", "calibration", "daemon", "tools")
 
 LIBRARIES = (
     Library("Eigen", r"(unsupported/)?Eigen/", ("Eigen3::Eigen",), EVERYWHERE),
@@ -48,7 +49,7 @@ LIBRARIES = (
     Library("zlib", r"z(lib|conf)\.h", ("ZLIB::ZLIB",),
             ("drivers/replay/scannet", "drivers/d435i/monitor", "slam/storage")),
     Library("yaml-cpp", r"yaml-cpp/", ("yaml-cpp",), ("drivers/replay",)),
-    Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay")),
+    Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay", "tools/calibrate")),
     Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/src/command_line.cpp", "tools")),
     Library("nlohmann-json", r"nlohmann/", ("nlohmann_json::nlohmann_json",), ("daemon", "tools")),
     Library("cairo", r"cairo", ("PkgConfig::CAIRO",), ("tools/plot",)),

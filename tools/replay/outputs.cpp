@@ -1,12 +1,7 @@
 #include "replay/outputs.hpp"
 
 #include <filesystem>
-#include <fstream>
-#include <functional>
-#include <ios>
 #include <string>
-#include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -16,53 +11,14 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/tools/estimate_table.hpp"
+#include "geoflow/tools/output_files.hpp"
 #include "geoflow/tools/trajectory_file.hpp"
 
 #include "replay/session.hpp"
 
 namespace geoflow::tools {
-namespace {
 
 namespace fs = std::filesystem;
-
-/// Writes beside the target, then renames over it.
-Result<void> replace_file(const fs::path& target,
-                          const std::function<Result<void>(const fs::path&)>& write) {
-  fs::path partial = target;
-  partial += ".partial";
-  auto written = write(partial);
-  if (!written) {
-    return written;
-  }
-  std::error_code code;
-  fs::rename(partial, target, code);
-  if (code) {
-    return fail(ErrorCode::kSystem, "{}: {}", target.string(), code.message());
-  }
-  return {};
-}
-
-Result<void> write_text(const fs::path& path, std::string_view text) {
-  std::ofstream out{path, std::ios::binary | std::ios::trunc};
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  return out ? Result<void>{} : fail(ErrorCode::kSystem, "{}: cannot be written", path.string());
-}
-
-}  // namespace
-
-Result<void> prepare_output(const fs::path& directory) {
-  std::error_code code;
-  fs::create_directories(directory, code);
-  if (code || !fs::is_directory(directory, code)) {
-    return fail(ErrorCode::kSystem, "{}: cannot be made: {}", directory.string(),
-                code ? code.message() : std::string{"it is a file"});
-  }
-  const fs::path probe = directory / ".probe";
-  auto written = write_text(probe, "");
-  fs::remove(probe, code);
-  return written;
-}
 
 Result<void> write_outputs(const fs::path& directory, const ReplayResult& result,
                            const nlohmann::json& report) {
@@ -92,8 +48,7 @@ Result<void> write_outputs(const fs::path& directory, const ReplayResult& result
   constexpr int kIndent = 2;
   const std::string text =
       report.dump(kIndent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-  return replace_file(directory / "report.json",
-                      [&](const fs::path& path) { return write_text(path, text); });
+  return replace_file(directory / "report.json", text);
 }
 
 }  // namespace geoflow::tools

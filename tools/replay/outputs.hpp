@@ -10,10 +10,6 @@
 
 namespace geoflow::tools {
 
-/// Makes the output folder if it is not there, and checks that files can be written to it, before
-/// any work is done.
-[[nodiscard]] Result<void> prepare_output(const std::filesystem::path& directory);
-
 /// Writes live_camera.txt, live_base.txt, final_camera.txt, final_base.txt, estimates.csv and
 /// report.json. Each file is replaced as a whole or not at all.
 [[nodiscard]] Result<void> write_outputs(const std::filesystem::path& directory,

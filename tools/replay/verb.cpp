@@ -22,6 +22,7 @@
 #include "geoflow/slam/saved_map.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
+#include "geoflow/tools/output_files.hpp"
 
 #include "replay/outputs.hpp"
 #include "replay/report.hpp"

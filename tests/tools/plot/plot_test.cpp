@@ -53,6 +53,19 @@ TEST(Ticks, AreRoundAndWithinTheRange) {
               testing::ElementsAre("2e+06", "3e+06", "4e+06"));
 }
 
+TEST(Ticks, OfLogarithmsArePowersOfTen) {
+  std::vector<std::string> found;
+  for (const Tick& tick : decade_ticks({.low = -4.2, .high = -0.9})) {
+    found.push_back(tick.label);
+  }
+  EXPECT_THAT(found, testing::ElementsAre("1e-4", "1e-3", "1e-2", "1e-1"));
+  found.clear();
+  for (const Tick& tick : decade_ticks({.low = 0.2, .high = 1.1})) {
+    found.push_back(tick.label);
+  }
+  EXPECT_THAT(found, testing::ElementsAre("2e0", "5e0", "1e1"));
+}
+
 TEST(RangeFinder, IsNeverEmptyAndLeavesOutWhatCannotBeDrawn) {
   RangeFinder none;
   none.add(std::numeric_limits<double>::quiet_NaN());

@@ -1,7 +1,10 @@
 #include "plot/src/axes.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
+#include <vector>
 
 #include "geoflow/tools/plot.hpp"
 
@@ -89,10 +92,31 @@ int tick_count(double side_px) {
   return std::max(2, static_cast<int>(side_px / kTickSpacing));
 }
 
+/// With the logarithms of what stands on logarithmic axes; of what is not positive, no number.
+Axes with_logarithms(Axes axes) {
+  const auto take = [](std::vector<double>& values) {
+    std::ranges::transform(values, values.begin(), [](double value) {
+      return value > 0 ? std::log10(value) : std::numeric_limits<double>::quiet_NaN();
+    });
+  };
+  for (Series& series : axes.series) {
+    if (axes.log_x) {
+      take(series.x);
+    }
+    if (axes.log_y) {
+      take(series.y);
+    }
+  }
+  return axes;
+}
+
 void draw_frame(Canvas& canvas, const Axes& axes, const Mapping& mapping) {
   const Box& box = mapping.box;
   const double bottom = box.y + box.height;
-  for (const Tick& tick : ticks(mapping.x_range, tick_count(box.width))) {
+  const auto on_axis = [](bool log, const Range& range, double side_px) {
+    return log ? decade_ticks(range) : ticks(range, tick_count(side_px));
+  };
+  for (const Tick& tick : on_axis(axes.log_x, mapping.x_range, box.width)) {
     const double x = mapping.x(tick.value);
     canvas.begin(x, box.y);
     canvas.to(x, bottom);
@@ -102,7 +126,7 @@ void draw_frame(Canvas& canvas, const Axes& axes, const Mapping& mapping) {
     canvas.stroke(kFrameStroke);
     canvas.text(x, bottom + kLabelGap, tick.label, {.x = 0.5, .y = 0}, kTickText);
   }
-  for (const Tick& tick : ticks(mapping.y_range, tick_count(box.height))) {
+  for (const Tick& tick : on_axis(axes.log_y, mapping.y_range, box.height)) {
     const double y = mapping.y(tick.value);
     canvas.begin(box.x, y);
     canvas.to(box.x + box.width, y);
@@ -178,7 +202,8 @@ void draw_color_bar(Canvas& canvas, const Axes& axes, const Mapping& mapping, co
 
 }  // namespace
 
-void draw_axes(Canvas& canvas, const Axes& axes, const Box& cell) {
+void draw_axes(Canvas& canvas, const Axes& given, const Box& cell) {
+  const Axes axes = with_logarithms(given);
   const Mapping mapping = make_mapping(axes, cell);
   const Range values = value_range(axes);
   draw_frame(canvas, axes, mapping);

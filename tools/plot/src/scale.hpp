@@ -42,4 +42,8 @@ struct Tick {
 /// at most 3 * count.
 [[nodiscard]] std::vector<Tick> ticks(const Range& range, int count);
 
+/// Of a range of decimal logarithms: 1, 2 and 5 times powers of ten where it is narrow, else powers
+/// of ten alone.
+[[nodiscard]] std::vector<Tick> decade_ticks(const Range& range);
+
 }  // namespace geoflow::tools

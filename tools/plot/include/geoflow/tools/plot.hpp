@@ -50,6 +50,8 @@ struct Axes {
   std::string value_label{};  ///< of the colour bar, which is drawn where some series has values
   bool equal_aspect = false;  ///< a metre is as long to the right as upwards
   bool y_from_zero = false;   ///< the range of y begins at 0: for errors
+  bool log_x = false;         ///< logarithmic: what is not positive is not drawn
+  bool log_y = false;
   std::vector<Series> series{};
 };
 
