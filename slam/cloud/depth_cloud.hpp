@@ -31,7 +31,7 @@ struct DepthCloudConfig {
   /// A normal is taken from as many rings of neighbouring cells as make it this certain [rad], if
   /// they continue the surface.
   double normal_sigma_rad = 0.015;
-  double max_incidence_deg = 78.0;  ///< a steeper view of the surface is rejected
+  double max_incidence_deg = 86.0;  ///< a steeper view of the surface is rejected
 };
 // NOLINTEND(readability-magic-numbers)
 

@@ -203,7 +203,15 @@ Eigen::Vector4f DepthCloud::smoothed_normal(std::uint32_t cell) const noexcept {
     }
   };
   add_if_it_continues(static_cast<int>(cell));
-  for (int ring = 1; ring <= kRings && best.w() > enough; ++ring) {
+  // Cells at the limit of incidence are chosen by their normal's error where that is large.
+  constexpr float kCertainSigmas = 3.0F;
+  const Eigen::Vector3f towards_camera = -centre.point.normalized();
+  const auto certain = [&] {
+    const float from_limit = best.head<3>().dot(towards_camera) - min_cosine_;
+    return best.w() <= enough &&
+           from_limit * from_limit > kCertainSigmas * kCertainSigmas * best.w();
+  };
+  for (int ring = 1; ring <= kRings && !certain(); ++ring) {
     for_each_in_ring(*grid_, cell, ring, add_if_it_continues);
     PlaneFit fitted = plane;
     if (!fitted.solve() ||

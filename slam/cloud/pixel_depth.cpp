@@ -115,7 +115,9 @@ double depth_at(const DepthCloud& cloud, const FrameRef& depth, const Eigen::Vec
   const double inverse_depth = inverse_depth_at(raw);
   // A steep view of a floor may show what it mirrors: behind the floor, whatever its texture.
   constexpr double kAgrees = 0.1;
-  if (!surfel.valid() && !(std::abs(expected_m * inverse_depth - 1.0) < kAgrees)) {
+  constexpr float kSteepCosine = 0.208F;  // 78 degrees off the normal
+  const bool steep = -surfel.normal.dot(surfel.point) < kSteepCosine * surfel.point.norm();
+  if ((steep || !surfel.valid()) && !(std::abs(expected_m * inverse_depth - 1.0) < kAgrees)) {
     return 0;
   }
   constexpr double kOnSurfaceSigmas = 3.0;

@@ -252,6 +252,12 @@ std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<K
   for (const auto& [strength, id] : by_connection) {
     held.insert(id);
   }
+  // Registrations and points leave directions open: what legs and IMU say of the way to the window
+  // does not.
+  const std::optional<RelativeEdge>& way_here = map.keyframe(*moving.begin()).reckoned;
+  if (way_here && map.same_part(way_here->from, *moving.begin())) {
+    held.insert(way_here->from);
+  }
   return held;
 }
 

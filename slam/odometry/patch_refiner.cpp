@@ -72,9 +72,8 @@ std::optional<PatchWarp> PatchRefiner::warp(const Keyframe& reference, const Vec
   return make_warp(corners);
 }
 
-std::optional<Vector2d> PatchRefiner::refine(const Map& map, const MapPoint& point,
-                                             const SE3& T_odom_cam, const ImagePyramid& current,
-                                             const Vector2d& raw) const {
+PatchSearch PatchRefiner::refine(const Map& map, const MapPoint& point, const SE3& T_odom_cam,
+                                 const ImagePyramid& current, const Vector2d& raw) const {
   for (const Observation& observation : point.observations) {
     const Keyframe& reference = map.keyframe(observation.keyframe);
     if (!reference.pyramid || !reference.cloud) {
@@ -86,7 +85,7 @@ std::optional<Vector2d> PatchRefiner::refine(const Map& map, const MapPoint& poi
       return align_patch(*reference.pyramid, *found, current, raw);
     }
   }
-  return std::nullopt;
+  return {};
 }
 
 }  // namespace geoflow::slam

@@ -18,11 +18,10 @@ class PatchRefiner {
  public:
   explicit PatchRefiner(const CameraModel& camera) : camera_{camera} {}
 
-  /// The raw pixel of `point` in `current`, which stands about at `T_odom_cam`, near `raw`. None
-  /// where no keyframe's view will do.
-  [[nodiscard]] std::optional<Vector2d> refine(const Map& map, const MapPoint& point,
-                                               const SE3& T_odom_cam, const ImagePyramid& current,
-                                               const Vector2d& raw) const;
+  /// Looks for `point` in `current`, which stands about at `T_odom_cam`, near `raw`. Unknown where
+  /// no keyframe's view will do.
+  [[nodiscard]] PatchSearch refine(const Map& map, const MapPoint& point, const SE3& T_odom_cam,
+                                   const ImagePyramid& current, const Vector2d& raw) const;
 
  private:
   [[nodiscard]] std::optional<PatchWarp> warp(const Keyframe& reference, const Vector3d& p_odom,

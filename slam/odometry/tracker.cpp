@@ -34,6 +34,7 @@
 #include "vision/dual_stream_flow.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/orb_features.hpp"
+#include "vision/patch_alignment.hpp"
 #include "vision/place_view.hpp"
 #include "vision/pnp.hpp"
 #include "vision/row_time.hpp"
@@ -131,7 +132,7 @@ void Tracker::follow_by_flow(const Map& map, const SE3& T_odom_cam_predicted) {
         const std::optional<PointId>& id = previous_.features[i].point;
         const MapPoint* point = id ? map.find_point(*id) : nullptr;
         return point == nullptr
-                   ? std::nullopt
+                   ? PatchSearch{}
                    : refiner_.refine(map, *point, T_odom_cam_predicted, *current_.pyramid, pixel);
       });
   finish_frame();

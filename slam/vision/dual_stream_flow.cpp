@@ -13,6 +13,7 @@
 #include "geoflow/hal/geometry.hpp"
 
 #include "vision/image_pyramid.hpp"
+#include "vision/patch_alignment.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -53,7 +54,7 @@ struct DualStreamFlow::Stream {
   const ImagePyramid& previous;
   const ImagePyramid& current;
   std::span<const FlowSeed> seeds;
-  const Confirm& confirm;
+  const LookFor& look_for;
   bool from_prediction;
 };
 
@@ -86,8 +87,10 @@ void DualStreamFlow::track_stream(const Stream& stream, const std::vector<std::s
     if (found[k] == 0 || !camera_.contains(from_cv(to[k]), 1)) {
       continue;
     }
-    tracks[i] = stream.confirm ? stream.confirm(i, from_cv(to[k])) : std::nullopt;
-    if (!tracks[i]) {
+    const PatchSearch search = stream.look_for ? stream.look_for(i, from_cv(to[k])) : PatchSearch{};
+    if (search.found()) {
+      tracks[i] = search.pixel;
+    } else if (search.result == PatchSearch::Result::kUnknown) {
       doubtful.push_back(i);
       from_current.push_back(to[k]);
       back.push_back(from[k]);
@@ -157,7 +160,7 @@ void DualStreamFlow::reject_double_occupancy(std::vector<std::optional<Vector2d>
 std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& previous,
                                                            const ImagePyramid& current,
                                                            std::span<const FlowSeed> seeds,
-                                                           const Confirm& confirm) const {
+                                                           const LookFor& look_for) const {
   std::vector<std::optional<Vector2d>> tracks(seeds.size());
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
@@ -169,7 +172,7 @@ std::vector<std::optional<Vector2d>> DualStreamFlow::track(const ImagePyramid& p
   Stream stream{.previous = previous,
                 .current = current,
                 .seeds = seeds,
-                .confirm = confirm,
+                .look_for = look_for,
                 .from_prediction = true};
   track_stream(stream, chosen, tracks);
   chosen.clear();

@@ -13,6 +13,7 @@
 
 #include "vision/camera_model.hpp"
 #include "vision/image_pyramid.hpp"
+#include "vision/patch_alignment.hpp"
 
 namespace geoflow::slam {
 
@@ -28,14 +29,16 @@ struct FlowSeed {
 ///
 /// 1. 3D-to-2D: pyramidal Lucas-Kanade from the predicted pixels of features with a map point.
 /// 2. 2D-to-2D: the rest and the first stream's failures, from where they were in the previous
-/// image. Both are checked forward and backward, but for tracks that something else confirms; then
-/// the epipolar geometry of all tracks (fundamental matrix by RANSAC) drops what does not move with
-/// the camera, and a mask keeps two tracks from ending at the same place.
+/// image. Where the patch of a map point can be looked for, that decides; other tracks are checked
+/// forward and backward, which noise and mirrored light pass as well as texture: on a dark floor
+/// they lag behind the motion. Then the epipolar geometry of all tracks (fundamental matrix by
+/// RANSAC) drops what does not move with the camera, and a mask keeps two tracks from ending at the
+/// same place.
 class DualStreamFlow {
  public:
-  /// The raw pixel in the current image of the seed of that number, from where flow has found it,
-  /// by a way of its own that needs no check backward; nothing where it cannot tell.
-  using Confirm = std::function<std::optional<Vector2d>(std::size_t seed, const Vector2d& pixel)>;
+  /// Looks for the patch of the seed of that number in the current image, from the raw pixel where
+  /// flow has found it.
+  using LookFor = std::function<PatchSearch(std::size_t seed, const Vector2d& pixel)>;
 
   DualStreamFlow(const FlowConfig& config, const CameraModel& camera)
       : config_{config}, camera_{camera} {}
@@ -45,7 +48,7 @@ class DualStreamFlow {
   [[nodiscard]] std::vector<std::optional<Vector2d>> track(const ImagePyramid& previous,
                                                            const ImagePyramid& current,
                                                            std::span<const FlowSeed> seeds,
-                                                           const Confirm& confirm = {}) const;
+                                                           const LookFor& look_for = {}) const;
 
  private:
   struct Stream;

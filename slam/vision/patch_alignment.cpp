@@ -153,6 +153,10 @@ std::optional<Template> make_template(const WidePatch& wide) {
   return made;
 }
 
+PatchSearch not_there() {
+  return {.result = PatchSearch::Result::kNotThere};
+}
+
 }  // namespace
 
 std::optional<PatchWarp> make_warp(const Eigen::Matrix<double, 2, 4>& corners) {
@@ -190,8 +194,8 @@ std::optional<PatchWarp> make_warp(const Eigen::Matrix<double, 2, 4>& corners) {
   return warp;
 }
 
-std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWarp& warp,
-                                    const ImagePyramid& current, const Vector2d& start) {
+PatchSearch align_patch(const ImagePyramid& reference, const PatchWarp& warp,
+                        const ImagePyramid& current, const Vector2d& start) {
   constexpr int kIterations = 20;
   constexpr double kConvergedPx = 0.02;
   constexpr double kStrayPx = 2;
@@ -200,9 +204,12 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
   constexpr double kLeastInformation =
       0.01;  // of the weaker direction [1/px^2]: 0.1 of all contrast a pixel
   const auto wide = warped(reference, warp);
-  const auto wanted = wide ? make_template(*wide) : std::nullopt;
+  if (!wide) {
+    return {};
+  }
+  const auto wanted = make_template(*wide);
   if (!wanted) {
-    return std::nullopt;
+    return not_there();
   }
   const Template& sought = *wanted;
   const double half_trace = 0.5 * sought.information.trace();
@@ -210,7 +217,7 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
       half_trace -
       std::sqrt(std::max(0.0, half_trace * half_trace - sought.information.determinant()));
   if (weaker < kLeastInformation) {
-    return std::nullopt;
+    return not_there();
   }
   const Eigen::Matrix2d covariance = sought.information.inverse();
   Vector2d pixel = start;
@@ -218,7 +225,7 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
     const auto patch = read(current.image(), pixel);
     const auto seen = patch ? normalised(*patch) : std::nullopt;
     if (!seen) {
-      return std::nullopt;
+      return not_there();
     }
     const Patch difference = seen->gray - sought.gray;
     const Vector2d gradient{static_cast<double>((sought.by_x * difference).sum()),
@@ -226,18 +233,19 @@ std::optional<Vector2d> align_patch(const ImagePyramid& reference, const PatchWa
     const Vector2d step = covariance * gradient;
     pixel -= step;
     if (!((pixel - start).norm() < kStrayPx)) {
-      return std::nullopt;
+      return not_there();
     }
     if (step.norm() < kConvergedPx) {
       const double correlation = static_cast<double>((seen->gray * sought.gray).sum());
       // A camera's noise and blur cost correlation but not the place: what counts is how well the
       // differences that are left let it be told (two unit patches differ by 2 - 2 correlation).
       const double variance_px2 = 2 * (1 - correlation) / (kSide * kSide) / weaker;
-      return correlation > kAlike && variance_px2 < kCertainPx * kCertainPx ? std::optional{pixel}
-                                                                            : std::nullopt;
+      return correlation > kAlike && variance_px2 < kCertainPx * kCertainPx
+                 ? PatchSearch{.result = PatchSearch::Result::kFound, .pixel = pixel}
+                 : not_there();
     }
   }
-  return std::nullopt;
+  return not_there();
 }
 
 }  // namespace geoflow::slam

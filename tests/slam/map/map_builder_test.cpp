@@ -1,7 +1,9 @@
 #include "map/map_builder.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -99,6 +101,41 @@ TEST_F(MapBuilderTest, TheAdjustmentSeesEveryKeyframeAndHoldsAtLeastOne) {
   for (const MappingPoint& point : problem->points) {
     EXPECT_GE(point.observations.size(), 2U);
   }
+}
+
+// Held keyframes are those with the most in common; the one before the window may not be among
+// them. Without it nothing may tell how far the window is along a floor or a corridor.
+TEST_F(MapBuilderTest, TheAdjustmentHoldsWhatTheWindowIsReckonedFrom) {
+  constexpr int kKeyframes = 25;
+  const Config config;
+  Frame frame = frame_at(SE3{});
+  KeyframeId newest = builder_.insert(map_, frame, Matrix6d::Zero());
+  for (int i = 1; i < kKeyframes; ++i) {
+    Frame next;  // sees nothing that another has seen
+    next.T_odom_cam = SE3{Eigen::Quaterniond::Identity(), Vector3d{0.1 * i, 0, 0}};
+    next.pyramid = frame.pyramid;
+    const KeyframeId before = newest;
+    newest = builder_.insert(map_, next, Matrix6d::Zero());
+    map_.keyframe(newest).reckoned = RelativeEdge{
+        .from = before, .to = newest, .T_from_to = SE3{}, .information = Matrix6d::Identity()};
+    map_.add_edge(*map_.keyframe(newest).reckoned);
+  }
+  // Old keyframes that look firmly tied to the window: more of them than are held.
+  for (int i = 0; i < config.mapping.fixed; ++i) {
+    for (int times = 0; times < 2; ++times) {
+      map_.add_edge({.from = std::next(map_.keyframes().begin(), i)->first,
+                     .to = newest,
+                     .T_from_to = SE3{},
+                     .information = Matrix6d::Zero()});
+    }
+  }
+  const auto problem = builder_.task(map_, newest).problem;
+  const auto oldest_moving =
+      std::ranges::find_if(problem->keyframes, [](const auto& k) { return !k.fixed; });
+  ASSERT_NE(oldest_moving, problem->keyframes.end());
+  const KeyframeId from = map_.keyframe(oldest_moving->id).reckoned->from;
+  EXPECT_TRUE(std::ranges::any_of(problem->keyframes,
+                                  [&](const auto& k) { return k.fixed && k.id == from; }));
 }
 
 TEST_F(MapBuilderTest, PointsThatAreSeldomWhereTheyShouldBeAreForgotten) {

@@ -25,6 +25,7 @@
 #include "vision/dual_stream_flow.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/orb_features.hpp"
+#include "vision/patch_alignment.hpp"
 
 /// A camera low above a floor, as a robot dog's: what is ahead is seen at a slant.
 namespace geoflow::slam {
@@ -104,7 +105,9 @@ class PatchRefinerTest : public testing::Test {
       for (std::size_t k = 0; k < at.size(); ++k) {
         at[k] = at[k] ? tracks[k] : std::nullopt;
         if (refined && at[k]) {
-          at[k] = refiner.refine(map_, *map_.find_point(points_[k]), pose(i), *current, *at[k]);
+          const PatchSearch search =
+              refiner.refine(map_, *map_.find_point(points_[k]), pose(i), *current, *at[k]);
+          at[k] = search.found() ? std::optional{search.pixel} : std::nullopt;
         }
       }
       previous = current;
@@ -153,14 +156,16 @@ TEST_F(PatchRefinerTest, WithoutASurfaceOrAnImageThereIsNothingToAlign) {
   const PatchRefiner refiner{camera_};
   const MapPoint& point = *map_.find_point(points_.front());
   const auto refine = [&] { return refiner.refine(map_, point, pose(0), *first_, corners_[0]); };
-  ASSERT_TRUE(refine());
-  EXPECT_LT((*refine() - corners_[0]).norm(), 0.01);
+  ASSERT_TRUE(refine().found());
+  EXPECT_LT((refine().pixel - corners_[0]).norm(), 0.01);
   map_.keyframe(point.observations[0].keyframe).cloud.reset();
-  EXPECT_FALSE(refine());
+  EXPECT_EQ(refine().result, PatchSearch::Result::kUnknown);
   look(8);
   map_.keep_newest(10, 0);
-  EXPECT_FALSE(
-      refiner.refine(map_, *map_.find_point(points_.back()), pose(0), *first_, corners_.back()));
+  EXPECT_EQ(
+      refiner.refine(map_, *map_.find_point(points_.back()), pose(0), *first_, corners_.back())
+          .result,
+      PatchSearch::Result::kUnknown);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "vision/dual_stream_flow.hpp"
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "slam/vision/textured_wall.hpp"
 #include "vision/image_pyramid.hpp"
 #include "vision/orb_features.hpp"
+#include "vision/patch_alignment.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -120,30 +122,32 @@ TEST(DualStreamFlow, LetsNoTwoTracksEndAtOnePlace) {
   }
 }
 
-TEST(DualStreamFlow, TakesTheWordOfWhatConfirmsATrack) {
-  // Every other seed is confirmed, 3 px from where flow found it: nothing that a check would pass.
+TEST(DualStreamFlow, TakesTheWordOfWhatLooksForAPatch) {
+  // Of three seeds one is found 3 px from where flow has it, which no check would pass, one is not
+  // there, though flow has it, and one cannot be told.
   const Views views{small_step};
-  const auto unconfirmed = views.tracked();
-  const auto confirm = [&](std::size_t i, const Vector2d& pixel) {
+  const auto by_flow = views.tracked();
+  const auto look_for = [&](std::size_t i, const Vector2d& pixel) {
     EXPECT_LT((pixel - views.truth[i]).norm(), 20) << i;
-    return i % 2 == 0 ? std::optional{Vector2d{pixel + Vector2d{0, 3}}} : std::nullopt;
+    return PatchSearch{.result = static_cast<PatchSearch::Result>(i % 3),
+                       .pixel = pixel + Vector2d{0, 3}};
   };
   FlowConfig flow;
   flow.fundamental_threshold_px = 10;
   const auto tracks = DualStreamFlow{flow, views.camera}.track(
-      views.pyramid(SE3{}), views.pyramid(views.T_odom_b), views.seeds, confirm);
-  std::size_t moved = 0;
-  std::size_t kept = 0;
+      views.pyramid(SE3{}), views.pyramid(views.T_odom_b), views.seeds, look_for);
+  std::map<PatchSearch::Result, std::size_t> followed;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (tracks[i] && unconfirmed[i]) {
-      const Vector2d by = *tracks[i] - *unconfirmed[i];
-      EXPECT_NEAR(by.y(), i % 2 == 0 ? 3 : 0, 0.01) << i;
-      moved += i % 2 == 0 ? 1U : 0U;
-      kept += i % 2 == 0 ? 0U : 1U;
+    if (tracks[i] && by_flow[i]) {
+      const auto result = static_cast<PatchSearch::Result>(i % 3);
+      const Vector2d by = *tracks[i] - *by_flow[i];
+      EXPECT_NEAR(by.y(), result == PatchSearch::Result::kFound ? 3 : 0, 0.01) << i;
+      ++followed[result];
     }
   }
-  EXPECT_GT(moved, views.seeds.size() / 4);
-  EXPECT_GT(kept, views.seeds.size() / 4);
+  EXPECT_GT(followed[PatchSearch::Result::kFound], views.seeds.size() / 6);
+  EXPECT_GT(followed[PatchSearch::Result::kUnknown], views.seeds.size() / 6);
+  EXPECT_EQ(followed[PatchSearch::Result::kNotThere], 0U);
 }
 
 TEST(DualStreamFlow, TakesNoWiderWindowFromAPredictionThanThePyramidsHaveRoomFor) {

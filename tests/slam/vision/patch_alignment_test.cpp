@@ -81,9 +81,9 @@ TEST(PatchAlignment, FindsAShiftWhateverTheExposure) {
       image_of([](double x, double y) { return 20 + 0.7 * wave(x - 0.37, y + 0.62); });
   const auto warp = make_warp(square({60, 44}, kPatchRadiusPx));
   const auto found = align_patch(reference, *warp, current, Vector2d{59.4, 44.3});
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->x(), 60.37, 0.02);
-  EXPECT_NEAR(found->y(), 43.38, 0.02);
+  ASSERT_TRUE(found.found());
+  EXPECT_NEAR(found.pixel.x(), 60.37, 0.02);
+  EXPECT_NEAR(found.pixel.y(), 43.38, 0.02);
 }
 
 TEST(PatchAlignment, FindsWhatIsSeenFromHalfTheDistance) {
@@ -92,9 +92,9 @@ TEST(PatchAlignment, FindsWhatIsSeenFromHalfTheDistance) {
       image_of([](double x, double y) { return wave(40 + 0.5 * (x - 64), 50 + 0.5 * (y - 48)); });
   const auto warp = make_warp(square({40, 50}, 0.5 * kPatchRadiusPx));
   const auto found = align_patch(reference, *warp, current, Vector2d{65, 47});
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->x(), 64, 0.03);
-  EXPECT_NEAR(found->y(), 48, 0.03);
+  ASSERT_TRUE(found.found());
+  EXPECT_NEAR(found.pixel.x(), 64, 0.03);
+  EXPECT_NEAR(found.pixel.y(), 48, 0.03);
 }
 
 /// A dim scene's noise takes two patches' correlation to two thirds. Flow alone, which is then all
@@ -116,8 +116,9 @@ TEST(PatchAlignment, FindsItsPlaceThroughNoiseWithoutBias) {
     const ImagePyramid reference = image_of([&](double x, double y) { return noisy(wave(x, y)); });
     const ImagePyramid current =
         image_of([&](double x, double y) { return noisy(wave(x - shift.x(), y - shift.y())); });
-    if (const auto pixel = align_patch(reference, *warp, current, Vector2d{60, 44})) {
-      const Vector2d error = *pixel - (Vector2d{60, 44} + shift);
+    const PatchSearch search = align_patch(reference, *warp, current, Vector2d{60, 44});
+    if (search.found()) {
+      const Vector2d error = search.pixel - (Vector2d{60, 44} + shift);
       ++found;
       sum += error;
       squares += error.squaredNorm();
@@ -129,19 +130,22 @@ TEST(PatchAlignment, FindsItsPlaceThroughNoiseWithoutBias) {
 }
 
 TEST(PatchAlignment, RefusesWhatDoesNotDetermineIt) {
+  constexpr auto kNotThere = PatchSearch::Result::kNotThere;
   const ImagePyramid reference = image_of(wave);
   const auto warp = make_warp(square({60, 44}, kPatchRadiusPx));
   const Vector2d start{60, 44};
-  EXPECT_FALSE(align_patch(reference, *warp, image_of([](double, double) { return 100; }), start));
-  EXPECT_FALSE(align_patch(reference, *warp,
-                           image_of([](double x, double y) { return wave(y, x); }), start));
-  EXPECT_FALSE(align_patch(reference, *warp, reference, Vector2d{4, 44}));
-  EXPECT_FALSE(align_patch(reference, *warp, reference, Vector2d{60, 49}));
+  const auto look = [&](const ImagePyramid& in, const PatchWarp& as, const ImagePyramid& current,
+                        const Vector2d& from) { return align_patch(in, as, current, from).result; };
+  EXPECT_EQ(look(reference, *warp, image_of([](double, double) { return 100; }), start), kNotThere);
+  EXPECT_EQ(look(reference, *warp, image_of([](double x, double y) { return wave(y, x); }), start),
+            kNotThere);
+  EXPECT_EQ(look(reference, *warp, reference, Vector2d{4, 44}), kNotThere);
+  EXPECT_EQ(look(reference, *warp, reference, Vector2d{60, 49}), kNotThere);
   const ImagePyramid stripes =
       image_of([](double x, double) { return 120 + 50 * std::sin(0.5 * x); });
-  EXPECT_FALSE(align_patch(stripes, *warp, stripes, start));
+  EXPECT_EQ(look(stripes, *warp, stripes, start), kNotThere);
   const auto outside = make_warp(square({3, 44}, kPatchRadiusPx));
-  EXPECT_FALSE(align_patch(reference, *outside, reference, start));
+  EXPECT_EQ(look(reference, *outside, reference, start), PatchSearch::Result::kUnknown);
 }
 
 }  // namespace
