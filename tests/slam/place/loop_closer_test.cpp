@@ -163,8 +163,8 @@ TEST_F(LoopCloserOnKitchen, ClosesALoopThatTheReferenceHas) {
     }
     const LoopSolution found = verify_loops(*problem);
     for (const LoopHypothesis& loop : found.found) {
-      // What this recording's calibration and reference leave of a pose from one image: depth alone,
-      // of views 40 frames apart, differs from the reference by 27 mm and 18 mrad rms.
+      // What this recording's calibration and reference leave of a pose from one image: depth
+      // alone, of views 40 frames apart, differs from the reference by 27 mm and 18 mrad rms.
       EXPECT_LT(error(loop.edge).tail<3>().norm(), 0.06);
       EXPECT_LT(error(loop.edge).head<3>().norm(), 0.04);
     }
