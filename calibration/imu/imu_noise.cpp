@@ -4,13 +4,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <tl/expected.hpp>
 
 #include "geoflow/calibration/allan.hpp"
@@ -39,6 +41,7 @@ constexpr std::size_t kCounted = 16;
 /// An axis that says no more values than these shows its steps, not its noise.
 constexpr std::size_t kFewestValues = 4;
 
+constexpr double kPercent = 100;
 constexpr double kGoodWhite = 0.025;  ///< relative standard deviation
 constexpr double kGoodWalk = 0.3;
 /// A misfit above this is more than chance: the model is not the whole truth.
@@ -166,7 +169,7 @@ Finding judge_white(const std::string& name, const NoiseTerm& noise, const char*
   if (noise.sigma() > kGoodWhite * noise.value()) {
     finding.verdict = Verdict::kWarn;
     finding.note = fmt::format("known to {:.1f} %: a longer recording would tell it to {:.1f} %",
-                               100 * noise.sigma() / noise.value(), 100 * kGoodWhite);
+                               kPercent * noise.sigma() / noise.value(), kPercent * kGoodWhite);
   }
   return finding;
 }
@@ -179,7 +182,7 @@ Finding judge_walk(const std::string& name, const NoiseTerm& noise, const char* 
   } else if (noise.sigma() > kGoodWalk * noise.value()) {
     finding.verdict = Verdict::kWarn;
     finding.note = fmt::format("known to {:.0f} %: a longer recording is needed for {:.0f} %",
-                               100 * noise.sigma() / noise.value(), 100 * kGoodWalk);
+                               kPercent * noise.sigma() / noise.value(), kPercent * kGoodWalk);
   }
   return finding;
 }

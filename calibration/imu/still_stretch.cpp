@@ -110,25 +110,27 @@ struct Run {
   std::size_t end = 0;
 };
 
-Run longest_run(const std::vector<Block>& blocks, const std::array<double, kImuAxes>& least) {
-  Run longest;
-  Run run;
+std::vector<Run> still_runs(const std::vector<Block>& blocks,
+                            const std::array<double, kImuAxes>& least) {
+  std::vector<Run> runs;
+  bool open = false;  // the last run goes on
   Reference reference;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const bool is_quiet = quiet(blocks[b], least);
-    if (!is_quiet || !reference.fits(blocks[b])) {
-      run.begin = is_quiet ? b : b + 1;
+    open = open && is_quiet && reference.fits(blocks[b]);
+    if (!open) {
       reference.restart();
     }
-    if (is_quiet) {
+    if (is_quiet && !open) {
+      runs.push_back({.begin = b, .end = b});
+      open = true;
+    }
+    if (open) {
       reference.take(blocks[b]);
-      run.end = b + 1;
-      if (run.end - run.begin > longest.end - longest.begin) {
-        longest = run;
-      }
+      runs.back().end = b + 1;
     }
   }
-  return longest;
+  return runs;
 }
 
 /// Without the blocks at its ends within which a motion may have ended or begun.
@@ -144,7 +146,7 @@ Run without_motion(Run run, std::size_t blocks) {
 
 }  // namespace
 
-StillStretch longest_still(const UniformRecording& recording) {
+std::vector<StillStretch> still_stretches(const UniformRecording& recording) {
   const auto length =
       std::max(kFewestInBlock, static_cast<std::size_t>(std::lround(kBlockS / recording.period_s)));
   std::vector<std::vector<Block>> pieces;
@@ -153,18 +155,24 @@ StillStretch longest_still(const UniformRecording& recording) {
     pieces.push_back(blocks_of(series, length));
   }
   const auto least = quietest(pieces);
-  StillStretch longest;
+  std::vector<StillStretch> stretches;
   for (std::size_t p = 0; p < pieces.size(); ++p) {
-    const Run run = without_motion(longest_run(pieces[p], least), pieces[p].size());
-    const bool to_the_end = run.end == pieces[p].size();
-    const StillStretch stretch{.piece = p,
-                               .begin = run.begin * length,
-                               .end = to_the_end ? recording.pieces[p].size() : run.end * length};
-    if (run.end > run.begin && stretch.size() > longest.size()) {
-      longest = stretch;
+    for (const Run& whole : still_runs(pieces[p], least)) {
+      const Run run = without_motion(whole, pieces[p].size());
+      const std::size_t end =
+          run.end == pieces[p].size() ? recording.pieces[p].size() : run.end * length;
+      if (run.end > run.begin) {
+        stretches.push_back({.piece = p, .begin = run.begin * length, .end = end});
+      }
     }
   }
-  return longest;
+  return stretches;
+}
+
+StillStretch longest_still(const UniformRecording& recording) {
+  const std::vector<StillStretch> all = still_stretches(recording);
+  const auto longest = std::ranges::max_element(all, {}, &StillStretch::size);
+  return longest == all.end() ? StillStretch{} : *longest;
 }
 
 }  // namespace geoflow::calibration

@@ -1,6 +1,5 @@
 #include "geoflow/tools/verb.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
 #include "tools/verb_fixture.hpp"
@@ -36,22 +36,51 @@ class CalibrateTest : public tests::VerbTest {
  protected:
   CalibrateTest() : VerbTest{make_calibrate_verb} {}
 
-  /// A csv of EuRoC's form of an IMU that lies still, at 200 Hz.
-  [[nodiscard]] std::string lying(double duration_s) const {
-    constexpr std::int64_t kPeriodNs = 5'000'000;
-    std::mt19937_64 random{1};
-    std::normal_distribution<double> normal;
-    const std::string path = file("imu.csv");
-    std::ofstream csv{path};
-    csv << "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n";
-    const auto count = static_cast<std::int64_t>(duration_s * 200);
-    for (std::int64_t i = 0; i < count; ++i) {
-      csv << 1'000'000'000 + i * kPeriodNs;
-      for (int axis = 0; axis < 3; ++axis) {
-        csv << ',' << 0.003 * normal(random);
+  /// A csv of EuRoC's form at 200 Hz.
+  class Csv {
+   public:
+    explicit Csv(const std::string& path) : file_{path} {
+      file_ << "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n";
+    }
+    /// An IMU that turns at `rate_radps` about x with `accel` for so long.
+    void say(double duration_s, const Vector3d& accel, double rate_radps) {
+      constexpr std::int64_t kPeriodNs = 5'000'000;
+      const auto end = count_ + static_cast<std::int64_t>(duration_s * 200);
+      for (; count_ < end; ++count_) {
+        file_ << 1'000'000'000 + count_ * kPeriodNs << ',' << rate_radps + 0.003 * normal_(random_);
+        file_ << ',' << 0.003 * normal_(random_) << ',' << 0.003 * normal_(random_);
+        for (const double value : accel) {
+          file_ << ',' << value + 0.02 * normal_(random_);
+        }
+        file_ << '\n';
       }
-      csv << ',' << 0.02 * normal(random) << ',' << 9.8 + 0.02 * normal(random) << ','
-          << 0.02 * normal(random) << '\n';
+    }
+
+   private:
+    std::ofstream file_;
+    std::mt19937_64 random_{1};
+    std::normal_distribution<double> normal_;
+    std::int64_t count_ = 0;
+  };
+
+  /// Of an IMU that lies still.
+  [[nodiscard]] std::string lying(double duration_s) const {
+    const std::string path = file("imu.csv");
+    Csv{path}.say(duration_s, {0, 9.8, 0}, 0);
+    return path;
+  }
+
+  /// Of one that is laid down on its sides, edges and corners, and whose x axis says 2 % too much.
+  [[nodiscard]] std::string laid_down() const {
+    const std::string path = file("poses.csv");
+    Csv csv{path};
+    for (int side = 0; side < 27; ++side) {
+      const Vector3d up{side % 3 - 1.0, side / 3 % 3 - 1.0, side / 9 - 1.0};
+      if (up.norm() > 0) {
+        const Vector3d accel = 9.80665 * up.normalized();
+        csv.say(2, {1.02 * accel.x(), accel.y(), accel.z()}, 0);
+        csv.say(0.5, {0, 0, 5}, 1);
+      }
     }
     return path;
   }
@@ -74,6 +103,20 @@ TEST_F(CalibrateTest, WritesResultPageAndFigure) {
   for (const auto& entry : std::filesystem::directory_iterator{output}) {
     EXPECT_THAT(entry.path().filename().string(), testing::StartsWith("imu-noise"));
   }
+}
+
+TEST_F(CalibrateTest, FindsAScaleThatIsWrong) {
+  const std::string output = file("out");
+  ASSERT_EQ(run({"imu", laid_down(), "-o", output}), 0) << err_;
+  EXPECT_THAT(out_, HasSubstr("It lies still 26 times"));
+  EXPECT_THAT(out_, HasSubstr("PASS  accel.scale_error_x"));
+  EXPECT_THAT(read(output + "/imu.toml"), HasSubstr("accel_scale_error_x = -0.019"));
+  EXPECT_THAT(read(output + "/imu-1.png"), HasSubstr("PNG"));
+}
+
+TEST_F(CalibrateTest, RefusesPosesThatAreTooFew) {
+  EXPECT_EQ(run({"imu", lying(5)}), 3);
+  EXPECT_THAT(err_, HasSubstr("imu.csv: it lies still 1 times"));
 }
 
 TEST_F(CalibrateTest, SaysFindingsAsJson) {
