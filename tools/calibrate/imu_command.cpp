@@ -12,7 +12,6 @@
 #include "geoflow/calibration/finding.hpp"
 #include "geoflow/calibration/imu_intrinsics.hpp"
 #include "geoflow/hal/result.hpp"
-#include "geoflow/hal/time.hpp"
 #include "geoflow/tools/plot.hpp"
 
 #include "calibrate/imu_recording.hpp"
@@ -50,6 +49,7 @@ Figure figure(const ImuIntrinsicsEstimate& estimate, const std::filesystem::path
   Axes directions{.title = "Up, in the IMU's frame", .x_label = "pose", .y_label = "m/s^2"};
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
+    values.reserve(estimate.poses.size());
     for (const ImuPose& pose : estimate.poses) {
       values.push_back(pose.mean.accel_mps2[axis]);
     }
@@ -86,7 +86,7 @@ Result<Outcome> calibrate_imu(const std::filesystem::path& recording,
   if (!estimate) {
     return tl::unexpected{std::move(estimate.error()).in(recording.string())};
   }
-  std::vector<Finding> findings = calibration::judge(*estimate, options);
+  const std::vector<Finding> findings = calibration::judge(*estimate, options);
   std::vector<std::string> facts{
       fmt::format("It lies still {} times for {} s or more; gravity is taken to be {} m/s^2.",
                   estimate->poses.size(), options.min_still_s, options.gravity_mps2)};

@@ -13,7 +13,6 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/calibration/allan.hpp"
-#include "geoflow/calibration/finding.hpp"
 #include "geoflow/calibration/imu_noise.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
@@ -32,6 +31,8 @@ using calibration::NoiseTerms;
 
 constexpr std::array<const char*, 3> kAxisLetters{"x", "y", "z"};
 constexpr int kFigureHeightPx = 620;
+/// Averaging times begin at one period; more than this, and the shortest ones were left out.
+constexpr double kFirstScale = 1.5;
 
 /// The Allan deviation that the three noises make at `tau_s`.
 double model(const NoiseTerms& terms, double tau_s) {
@@ -102,7 +103,7 @@ std::vector<std::string> facts(const ImuNoiseEstimate& estimate, const ImuRecord
                   estimate.samples, estimate.rate_hz, estimate.filled)};
   for (std::size_t axis = 0; axis < estimate.axes.size(); ++axis) {
     const AxisNoise& noise = estimate.axes.at(axis);
-    if (noise.shortest_tau_s > 1.5 / estimate.rate_hz) {
+    if (noise.shortest_tau_s * estimate.rate_hz > kFirstScale) {
       sentences.push_back(
           fmt::format("{}: averaging times below {:.3g} s were left out: its "
                       "samples are filtered.",

@@ -2,15 +2,14 @@
 
 #include <array>
 #include <bit>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
 
 #include <tl/expected.hpp>
 
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/samples.hpp"

@@ -91,14 +91,15 @@ std::vector<Tick> ticks(const Range& range, int count) {
 
 std::vector<Tick> decade_ticks(const Range& range) {
   constexpr double kWide = 3;  // decades
-  const double step = std::max(1.0, std::ceil(range.span() / kBase));
+  const int step = std::max(1, static_cast<int>(std::ceil(range.span() / kBase)));
   std::vector<Tick> result;
-  for (double power = std::floor(range.low); power <= range.high; power += step) {
+  const int last = static_cast<int>(std::floor(range.high));
+  for (int power = static_cast<int>(std::floor(range.low)); power <= last; power += step) {
     for (const double multiple : {1.0, 2.0, kHalfBase}) {
       const double value = power + std::log10(multiple);
       const bool wanted = multiple == 1.0 || range.span() < kWide;
       if (wanted && value >= range.low && value <= range.high) {
-        result.push_back({.value = value, .label = fmt::format("{:g}e{:g}", multiple, power)});
+        result.push_back({.value = value, .label = fmt::format("{:g}e{}", multiple, power)});
       }
     }
   }
