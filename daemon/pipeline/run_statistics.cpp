@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
@@ -30,6 +32,22 @@ json to_json(const timesync::StreamCounters& counters) {
 json to_json(const timesync::ClockCounters& counters) {
   return {
       {"samples", counters.samples}, {"outliers", counters.outliers}, {"jumps", counters.jumps}};
+}
+
+/// All that is timed, by the name that reports have for it.
+std::vector<std::pair<std::string, const TimeHistogram*>> histograms(
+    const RunStatistics& statistics) {
+  std::vector<std::pair<std::string, const TimeHistogram*>> named{
+      {"process", &statistics.process},
+      {"arrival_to_pose", &statistics.delivery},
+      {"imu_to_pose", &statistics.propagation}};
+  for (std::size_t i = 0; i < slam::kStageCount; ++i) {
+    const auto stage = static_cast<slam::Stage>(i);
+    const StageTimer& timer =
+        stage == slam::Stage::kMapping ? statistics.mapping : statistics.tracking;
+    named.emplace_back(to_string(stage), &timer.histogram(stage));
+  }
+  return named;
 }
 
 }  // namespace
@@ -78,14 +96,9 @@ json to_json(const RunStatistics& statistics) {
   for (std::size_t i = 0; i < kStatusCount; ++i) {
     by_status[to_string(static_cast<TrackingStatus>(i))] = counters.by_status[i].load();
   }
-  json times = {{"process", to_json(statistics.process.summary())},
-                {"arrival_to_pose", to_json(statistics.delivery.summary())},
-                {"imu_to_pose", to_json(statistics.propagation.summary())}};
-  for (std::size_t i = 0; i < slam::kStageCount; ++i) {
-    const auto stage = static_cast<slam::Stage>(i);
-    const StageTimer& timer =
-        stage == slam::Stage::kMapping ? statistics.mapping : statistics.tracking;
-    times[to_string(stage)] = to_json(timer.summary(stage));
+  json times = json::object();
+  for (const auto& [name, histogram] : histograms(statistics)) {
+    times[name] = to_json(histogram->summary());
   }
   return {{"frames", statistics.frames()},
           {"tracked", statistics.frames_with_pose()},
@@ -100,6 +113,18 @@ json to_json(const RunStatistics& statistics) {
           {"rejected", counters.rejected.load()},
           {"mapping_runs", counters.mapping_runs.load()},
           {"times_ms", std::move(times)}};
+}
+
+json histograms_to_json(const RunStatistics& statistics) {
+  json all = json::object();
+  for (const auto& [name, histogram] : histograms(statistics)) {
+    json buckets = json::array();
+    for (const TimeBucket& bucket : histogram->buckets()) {
+      buckets.push_back({bucket.lower_ms, bucket.upper_ms, bucket.count});
+    }
+    all[name] = std::move(buckets);
+  }
+  return all;
 }
 
 json to_json(const timesync::SynchroniserCounters& counters) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "geoflow/hal/time.hpp"
 
@@ -69,6 +70,18 @@ double TimeHistogram::percentile_ms(double share, std::uint64_t count) const noe
     }
   }
   return to_milliseconds(static_cast<double>(max_ns_.load(kRelaxed)));
+}
+
+std::vector<TimeBucket> TimeHistogram::buckets() const {
+  std::vector<TimeBucket> filled;
+  for (std::size_t i = 0; i < kBuckets; ++i) {
+    if (const std::uint32_t count = buckets_[i].load(kRelaxed); count > 0) {
+      filled.push_back({.lower_ms = i > 0 ? upper_edge_ms(i - 1) : 0.0,
+                        .upper_ms = upper_edge_ms(i),
+                        .count = count});
+    }
+  }
+  return filled;
 }
 
 TimeSummary TimeHistogram::summary() const noexcept {

@@ -42,6 +42,22 @@ TEST(TimeHistogram, PercentilesAreWithinThreePercentOfTheSorted) {
   EXPECT_NEAR(summary.max_ms, values.back(), 1e-6) << seed;
 }
 
+TEST(TimeHistogram, BucketsHoldWhatWasAdded) {
+  TimeHistogram histogram;
+  histogram.add(std::chrono::microseconds{5});
+  histogram.add(std::chrono::microseconds{5});
+  histogram.add(std::chrono::milliseconds{40});
+  const std::vector<TimeBucket> buckets = histogram.buckets();
+  ASSERT_EQ(buckets.size(), 2U);
+  EXPECT_EQ(buckets[0].count, 2U);
+  EXPECT_DOUBLE_EQ(buckets[0].lower_ms, 0.005);
+  EXPECT_DOUBLE_EQ(buckets[0].upper_ms, 0.006);
+  EXPECT_EQ(buckets[1].count, 1U);
+  EXPECT_LE(buckets[1].lower_ms, 40);
+  EXPECT_GT(buckets[1].upper_ms, 40);
+  EXPECT_LT(buckets[1].upper_ms / buckets[1].lower_ms, 1.035);
+}
+
 TEST(TimeHistogram, ExtremesStayInside) {
   TimeHistogram histogram;
   histogram.add(Duration{-5});

@@ -41,7 +41,8 @@ Walked walk_along(const std::string& scene, int duration_s = 8) {
   options.alignment = tools::Alignment::kOrigin;
   std::ifstream report{out / "report.json"};
   return {.evaluation = tools::evaluate(live, truth, options).value(),
-          .consistency = tools::consistency(estimates, truth.poses, {}).value(),
+          .consistency =
+              tools::consistency(tools::normalised_errors(estimates, truth.poses, {}).value()),
           .report = nlohmann::json::parse(report)};
 }
 

@@ -216,9 +216,11 @@ Result<std::optional<Consistency>> EvaluateVerb::measure_consistency(
   }
   return read_estimates(estimates_)
       .and_then([&](const std::vector<PoseEstimate>& estimates) {
-        return consistency(estimates, reference.poses, options.association);
+        return normalised_errors(estimates, reference.poses, options.association);
       })
-      .map([](const Consistency& found) { return std::optional{found}; });
+      .map([](const std::vector<NormalisedError>& errors) {
+        return std::optional{consistency(errors)};
+      });
 }
 
 Result<void> EvaluateVerb::write_files(const Evaluation& evaluation,

@@ -86,6 +86,7 @@ json make_report(const ReplayResult& result, const daemon::Config& config) {
   const drivers::RecordedStreams& streams = *result.run.streams;
   const Calibration& calibration = streams.calibration();
   json report = daemon::to_json(*result.run.statistics);
+  report["time_histograms_ms"] = daemon::histograms_to_json(*result.run.statistics);
   report["version"] = std::string{daemon::version()};
   report["input"] = describe_input(streams.info(), config);
   report["calibration"] = {{"source", calibration.source},

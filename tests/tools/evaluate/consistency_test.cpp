@@ -1,6 +1,7 @@
 #include "geoflow/tools/evaluate/consistency.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <random>
 #include <vector>
@@ -55,14 +56,15 @@ Walk walk(double honesty) {
 
 TEST(Consistency, IsOneWhereTheCovarianceIsTheErrors) {
   const Walk made = walk(1);
-  const auto found = consistency(made.estimates, made.truth, {});
-  ASSERT_TRUE(found) << found.error().message;
-  EXPECT_EQ(found->of(TrackingStatus::kTracking).estimates, kPoses * 3 / 4 - 1);
-  EXPECT_EQ(found->of(TrackingStatus::kDegraded).estimates, kPoses / 4);
-  EXPECT_EQ(found->of(TrackingStatus::kLost).estimates, 0U);
+  const auto errors = normalised_errors(made.estimates, made.truth, {});
+  ASSERT_TRUE(errors) << errors.error().message;
+  const Consistency found = consistency(*errors);
+  EXPECT_EQ(found.of(TrackingStatus::kTracking).estimates, kPoses * 3 / 4 - 1);
+  EXPECT_EQ(found.of(TrackingStatus::kDegraded).estimates, kPoses / 4);
+  EXPECT_EQ(found.of(TrackingStatus::kLost).estimates, 0U);
   // A mean over n estimates of k degrees of freedom has a deviation of sqrt(2 / (k n)).
   for (const TrackingStatus status : {TrackingStatus::kTracking, TrackingStatus::kDegraded}) {
-    const Nees& nees = found->of(status);
+    const Nees& nees = found.of(status);
     EXPECT_NEAR(nees.position, 1, 0.1);
     EXPECT_NEAR(nees.orientation, 1, 0.1);
     EXPECT_NEAR(nees.pose, 1, 0.08);
@@ -72,16 +74,34 @@ TEST(Consistency, IsOneWhereTheCovarianceIsTheErrors) {
 
 TEST(Consistency, SeesWhatPromisesTooMuch) {
   const Walk made = walk(0.25);
-  const auto found = consistency(made.estimates, made.truth, {});
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->of(TrackingStatus::kTracking).pose, 4, 0.2);
-  EXPECT_LT(found->of(TrackingStatus::kTracking).within_95, 0.6);
+  const auto errors = normalised_errors(made.estimates, made.truth, {});
+  ASSERT_TRUE(errors);
+  const Consistency found = consistency(*errors);
+  EXPECT_NEAR(found.of(TrackingStatus::kTracking).pose, 4, 0.2);
+  EXPECT_LT(found.of(TrackingStatus::kTracking).within_95, 0.6);
+}
+
+TEST(Consistency, TellsEachErrorBesideItsDeviation) {
+  const Walk made = walk(1);
+  const auto errors = normalised_errors(made.estimates, made.truth, {});
+  ASSERT_TRUE(errors);
+  ASSERT_EQ(errors->size(), kPoses - 1);
+  EXPECT_EQ(errors->front().t, made.truth[1].t);
+  EXPECT_EQ(errors->at(2).status, TrackingStatus::kDegraded);
+  std::size_t within = 0;
+  for (const NormalisedError& one : *errors) {
+    EXPECT_NEAR(one.sigma[2], 0.03, 1e-12);
+    EXPECT_NEAR(one.sigma[3], std::hypot(0.02, 0.04), 1e-12);
+    within += std::abs(one.error[4]) <= one.sigma[4] ? 1U : 0U;
+  }
+  // 68.3 % of a normal distribution lie within one deviation.
+  EXPECT_NEAR(static_cast<double>(within) / static_cast<double>(errors->size()), 0.683, 0.03);
 }
 
 TEST(Consistency, ACovarianceThatIsNoneIsRefused) {
   Walk made = walk(1);
   made.estimates[7].covariance.setZero();
-  const auto found = consistency(made.estimates, made.truth, {});
+  const auto found = normalised_errors(made.estimates, made.truth, {});
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().message,
               testing::HasSubstr("at 231000000 ns is not positive definite"));

@@ -1,16 +1,19 @@
 #include "geoflow/tools/plot.hpp"
 
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <ios>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "geoflow/hal/result.hpp"
 #include "tests/support/data.hpp"
@@ -115,6 +118,47 @@ TEST(SaveFigure, SaysWhatIsWrong) {
   Figure huge = figure;
   huge.width_px = 1'000'000;
   EXPECT_THAT(message(huge, "a.png"), HasSubstr("1000000 x 1050 px"));
+}
+
+TEST(FigureJson, HasWhatAScriptDrawsFrom) {
+  Figure figure = figure_of({0, 1, 2}, {1.23456789, std::numeric_limits<double>::quiet_NaN(), 3});
+  figure.axes[0].series[0].values = {0, 0.5, 1};
+  const nlohmann::json json = to_json(figure);
+  EXPECT_EQ(json.at("columns"), 2);
+  const nlohmann::json& axes = json.at("axes").at(0);
+  EXPECT_EQ(axes.at("title"), "title");
+  EXPECT_EQ(axes.at("equal"), true);
+  const nlohmann::json& series = axes.at("series").at(0);
+  EXPECT_EQ(series.at("x"), nlohmann::json::parse("[0, 1, 2]"));
+  EXPECT_EQ(series.at("y"), nlohmann::json::parse("[1.23457, null, 3]"));
+  EXPECT_EQ(series.at("values"), nlohmann::json::parse("[0, 0.5, 1]"));
+  EXPECT_EQ(series.at("color").size(), 3U);
+}
+
+TEST(FigureJson, OfALongSeriesKeepsWhatIsSeen) {
+  constexpr std::size_t kPoints = 200'000;
+  constexpr std::size_t kSpike = 123'457;
+  std::vector<double> x(kPoints);
+  std::vector<double> y(kPoints, 0.0);
+  std::iota(x.begin(), x.end(), 0.0);
+  y[kSpike] = 1;
+  y[kSpike + 1] = -2;
+  y[kSpike + 2] = std::numeric_limits<double>::infinity();
+  const nlohmann::json series = to_json(figure_of(x, y)).at("axes").at(0).at("series").at(0);
+  const auto kept = series.at("y").get<std::vector<nlohmann::json>>();
+  EXPECT_LE(kept.size(), 7000U);
+  EXPECT_EQ(kept.size(), series.at("x").size());
+  EXPECT_THAT(kept, testing::Contains(1));
+  EXPECT_THAT(kept, testing::Contains(-2));
+  EXPECT_THAT(kept, testing::Contains(nlohmann::json{}));
+  EXPECT_EQ(series.at("x").front(), 0);
+  EXPECT_EQ(series.at("x").back(), kPoints - 1);
+}
+
+TEST(FigureJson, ColorsGoFromDarkToLight) {
+  const nlohmann::json colors = color_map_json();
+  ASSERT_GE(colors.size(), 16U);
+  EXPECT_LT(colors.front().at(0), colors.back().at(0));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -36,6 +37,10 @@ class EstimateTableTest : public testing::Test {
       Matrix6d root = Matrix6d::Random();
       estimate.covariance = root * root.transpose();
       estimate.status = i == 1 ? TrackingStatus::kDegraded : TrackingStatus::kTracking;
+      estimate.source = i == 1 ? PoseSource::kConstantVelocity : PoseSource::kLegs;
+      estimate.quality = static_cast<std::uint8_t>(90 + i);
+      estimate.reset_counter = static_cast<std::uint32_t>(i);
+      estimate.map_id = static_cast<std::uint32_t>(7 * i);
     }
     return estimates;
   }
@@ -67,6 +72,10 @@ TEST_F(EstimateTableTest, IsReadAsItWasWritten) {
   for (std::size_t i = 0; i < written.size(); ++i) {
     EXPECT_EQ((*read)[i].t, written[i].t);
     EXPECT_EQ((*read)[i].status, written[i].status);
+    EXPECT_EQ((*read)[i].source, written[i].source);
+    EXPECT_EQ((*read)[i].quality, written[i].quality);
+    EXPECT_EQ((*read)[i].reset_counter, written[i].reset_counter);
+    EXPECT_EQ((*read)[i].map_id, written[i].map_id);
     EXPECT_LT(((*read)[i].T_odom_base.inverse() * written[i].T_odom_base).log().norm(), 1e-8);
     EXPECT_TRUE((*read)[i].covariance.isApprox(written[i].covariance, 1e-6));
   }
@@ -83,6 +92,10 @@ TEST_F(EstimateTableTest, IsATrajectoryInEurocsFormToo) {
 TEST_F(EstimateTableTest, WhatIsWrongIsNamedWithItsLine) {
   write_with("DEGRADED", "HAPPY");
   expect_refused("estimates.csv:3: column 9: 'HAPPY' is no status");
+  write_with("constant_velocity", "hearsay");
+  expect_refused("estimates.csv:3: column 10: 'hearsay' is no source");
+  write_with(",91,", ",-1,");
+  expect_refused("estimates.csv:3: column 11: '-1' is no quality");
   write_with("1305031102160407003", "1305031102160407002");
   expect_refused("estimates.csv:4: the time does not come after the line before's");
   write_with("TRACKING,", "TRACKING,,");

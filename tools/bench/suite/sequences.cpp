@@ -162,6 +162,15 @@ Result<std::vector<Sequence>> find_sequences(Suite suite, const fs::path& data) 
   return found;
 }
 
+std::optional<Sequence> sequence_at(const fs::path& recording) {
+  for (const Kind& kind : kKinds) {
+    if (auto sequence = kind.match(recording)) {
+      return sequence;
+    }
+  }
+  return std::nullopt;
+}
+
 Result<TrajectoryFile> read_reference(const Sequence& sequence) {
   if (!sequence.reference.empty()) {
     return read_trajectory(sequence.reference, TrajectoryFormat::kTum);

@@ -38,6 +38,10 @@ struct Sequence {
 [[nodiscard]] Result<std::vector<Sequence>> find_sequences(Suite suite,
                                                            const std::filesystem::path& data);
 
+/// What a recording is as a sequence of whichever suite knows its kind, without a name; none where
+/// its truth is not with it.
+[[nodiscard]] std::optional<Sequence> sequence_at(const std::filesystem::path& recording);
+
 /// The true trajectory of a sequence, on the recording's time line.
 [[nodiscard]] Result<TrajectoryFile> read_reference(const Sequence& sequence);
 

@@ -11,14 +11,12 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
-#include "geoflow/hal/time.hpp"
 #include "geoflow/hal/trajectory.hpp"
 #include "geoflow/tools/evaluate/association.hpp"
 
 namespace geoflow::tools {
 namespace {
 
-constexpr double kChiSquared95Of6 = 12.591587;
 constexpr double kHalf = 3;  // degrees of freedom of position, and of orientation
 
 /// e^T covariance^-1 e; none where the covariance is not positive definite.
@@ -31,21 +29,29 @@ std::optional<double> normalised(const Matrix& covariance, const Vector& error) 
   return error.dot(factor.solve(error));
 }
 
-bool add(Nees& nees, const Matrix6d& covariance, const Vector6d& error) {
-  const auto whole = normalised(covariance, error);
+/// False where the covariance is not positive definite.
+bool normalise(const Matrix6d& covariance, NormalisedError& out) {
+  const auto whole = normalised(covariance, out.error);
   const auto orientation =
-      normalised(Matrix3d{covariance.topLeftCorner<3, 3>()}, Vector3d{error.head<3>()});
+      normalised(Matrix3d{covariance.topLeftCorner<3, 3>()}, Vector3d{out.error.head<3>()});
   const auto position =
-      normalised(Matrix3d{covariance.bottomRightCorner<3, 3>()}, Vector3d{error.tail<3>()});
+      normalised(Matrix3d{covariance.bottomRightCorner<3, 3>()}, Vector3d{out.error.tail<3>()});
   if (!whole || !orientation || !position) {
     return false;
   }
-  ++nees.estimates;
-  nees.position += *position / kHalf;
-  nees.orientation += *orientation / kHalf;
-  nees.pose += *whole / (2 * kHalf);
-  nees.within_95 += *whole <= kChiSquared95Of6 ? 1.0 : 0.0;
+  out.sigma = covariance.diagonal().cwiseSqrt();
+  out.nees_position = *position / kHalf;
+  out.nees_orientation = *orientation / kHalf;
+  out.nees_pose = *whole / (2 * kHalf);
   return true;
+}
+
+void add(Nees& nees, const NormalisedError& one) {
+  ++nees.estimates;
+  nees.position += one.nees_position;
+  nees.orientation += one.nees_orientation;
+  nees.pose += one.nees_pose;
+  nees.within_95 += one.nees_pose <= kNeesPose95 ? 1.0 : 0.0;
 }
 
 void average(Nees& nees) {
@@ -59,8 +65,9 @@ void average(Nees& nees) {
 
 }  // namespace
 
-Result<Consistency> consistency(const std::vector<PoseEstimate>& estimates,
-                                const Trajectory& reference, const AssociationOptions& options) {
+Result<std::vector<NormalisedError>> normalised_errors(const std::vector<PoseEstimate>& estimates,
+                                                       const Trajectory& reference,
+                                                       const AssociationOptions& options) {
   Trajectory trajectory;
   for (const PoseEstimate& estimate : estimates) {
     trajectory.push_back({estimate.t, estimate.T_odom_base});
@@ -69,7 +76,7 @@ Result<Consistency> consistency(const std::vector<PoseEstimate>& estimates,
   if (!pairs) {
     return tl::unexpected{pairs.error()};
   }
-  Consistency result;
+  std::vector<NormalisedError> errors;
   const SE3 T_odom_ref = pairs->front().estimate * pairs->front().reference.inverse();
   auto estimate = estimates.begin();
   for (std::size_t i = 1; i < pairs->size(); ++i) {
@@ -77,12 +84,21 @@ Result<Consistency> consistency(const std::vector<PoseEstimate>& estimates,
     while (estimate->t + options.offset != pair.t) {
       ++estimate;
     }
-    const Vector6d error = (pair.estimate.inverse() * (T_odom_ref * pair.reference)).log();
-    Nees& nees = result.by_status.at(static_cast<std::size_t>(estimate->status));
-    if (!add(nees, estimate->covariance, error)) {
+    NormalisedError one{.t = pair.t, .status = estimate->status};
+    one.error = (pair.estimate.inverse() * (T_odom_ref * pair.reference)).log();
+    if (!normalise(estimate->covariance, one)) {
       return fail(ErrorCode::kInvalidData, "the covariance at {} ns is not positive definite",
                   estimate->t.time_since_epoch().count());
     }
+    errors.push_back(one);
+  }
+  return errors;
+}
+
+Consistency consistency(const std::vector<NormalisedError>& errors) {
+  Consistency result;
+  for (const NormalisedError& one : errors) {
+    add(result.by_status.at(static_cast<std::size_t>(one.status)), one);
   }
   for (Nees& nees : result.by_status) {
     average(nees);

@@ -25,7 +25,9 @@ constexpr double kColorBarWidth = 14;
 constexpr double kColorBarGap = 14;
 constexpr int kColorBarPieces = 128;
 
-constexpr double kTickSpacing = 90;  ///< about so far apart [px]
+// About so far apart [px].
+constexpr double kXTickSpacing = 90;
+constexpr double kYTickSpacing = 45;
 constexpr double kTickLength = 5;
 constexpr double kLabelGap = 8;
 constexpr double kXLabelDrop = 30;
@@ -88,8 +90,8 @@ Mapping make_mapping(const Axes& axes, const Box& cell) {
   return mapping;
 }
 
-int tick_count(double side_px) {
-  return std::max(2, static_cast<int>(side_px / kTickSpacing));
+int tick_count(double side_px, double spacing_px) {
+  return std::max(2, static_cast<int>(side_px / spacing_px));
 }
 
 /// With the logarithms of what stands on logarithmic axes; of what is not positive, no number.
@@ -113,10 +115,11 @@ Axes with_logarithms(Axes axes) {
 void draw_frame(Canvas& canvas, const Axes& axes, const Mapping& mapping) {
   const Box& box = mapping.box;
   const double bottom = box.y + box.height;
-  const auto on_axis = [](bool log, const Range& range, double side_px) {
-    return log ? decade_ticks(range) : ticks(range, tick_count(side_px));
+  const auto on_axis = [](bool log, const Range& range, int count) {
+    return log ? decade_ticks(range) : ticks(range, count);
   };
-  for (const Tick& tick : on_axis(axes.log_x, mapping.x_range, box.width)) {
+  for (const Tick& tick :
+       on_axis(axes.log_x, mapping.x_range, tick_count(box.width, kXTickSpacing))) {
     const double x = mapping.x(tick.value);
     canvas.begin(x, box.y);
     canvas.to(x, bottom);
@@ -126,7 +129,8 @@ void draw_frame(Canvas& canvas, const Axes& axes, const Mapping& mapping) {
     canvas.stroke(kFrameStroke);
     canvas.text(x, bottom + kLabelGap, tick.label, {.x = 0.5, .y = 0}, kTickText);
   }
-  for (const Tick& tick : on_axis(axes.log_y, mapping.y_range, box.height)) {
+  for (const Tick& tick :
+       on_axis(axes.log_y, mapping.y_range, tick_count(box.height, kYTickSpacing))) {
     const double y = mapping.y(tick.value);
     canvas.begin(box.x, y);
     canvas.to(box.x + box.width, y);
@@ -192,7 +196,7 @@ void draw_color_bar(Canvas& canvas, const Axes& axes, const Mapping& mapping, co
                 color_map(1.0 - (i + 0.5) / kColorBarPieces));
   }
   canvas.outline(bar, kFrameStroke);
-  for (const Tick& tick : ticks(values, tick_count(bar.height))) {
+  for (const Tick& tick : ticks(values, tick_count(bar.height, kYTickSpacing))) {
     const double y = bar.y + bar.height * (1.0 - (tick.value - values.low) / values.span());
     canvas.text(bar.x + bar.width + kLabelGap, y, tick.label, {.x = 0, .y = 0.5}, kTickText);
   }

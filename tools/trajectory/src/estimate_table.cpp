@@ -35,6 +35,10 @@ constexpr std::string_view kHeader =
     "rz_z,x_x[m^2],x_y,x_z,y_y,y_z,z_z\n";
 constexpr std::size_t kPoseColumn = 1;
 constexpr std::size_t kStatusColumn = 8;
+constexpr std::size_t kSourceColumn = 9;
+constexpr std::size_t kQualityColumn = 10;
+constexpr std::size_t kResetColumn = 11;
+constexpr std::size_t kMapColumn = 12;
 constexpr std::size_t kCovarianceColumn = 13;
 constexpr std::size_t kCovarianceValues = 21;
 constexpr std::size_t kColumns = kCovarianceColumn + kCovarianceValues;
@@ -97,15 +101,45 @@ Result<void> take_numbers(const Columns& columns, std::size_t first, std::size_t
   return {};
 }
 
-std::optional<TrackingStatus> status_of(std::string_view text) {
-  for (const TrackingStatus status :
-       {TrackingStatus::kStarting, TrackingStatus::kInitialising, TrackingStatus::kTracking,
-        TrackingStatus::kDegraded, TrackingStatus::kRelocalising, TrackingStatus::kLost}) {
-    if (text == to_string(status)) {
-      return status;
+/// The value of an enumeration, from 0 to `last`, that has this name.
+template <typename Enum>
+std::optional<Enum> named(std::string_view text, Enum last) {
+  for (std::uint8_t i = 0; i <= static_cast<std::uint8_t>(last); ++i) {
+    if (text == to_string(static_cast<Enum>(i))) {
+      return static_cast<Enum>(i);
     }
   }
   return std::nullopt;
+}
+
+/// Puts what a column was read as in its place; the message, with what was `expected`, where it is
+/// none.
+template <typename Value>
+Result<void> take(const Columns& columns, std::size_t column, const std::optional<Value>& value,
+                  std::string_view expected, Value& out) {
+  if (!value) {
+    return fail(ErrorCode::kInvalidData, "column {}: '{}' is no {}", column + 1, columns.at(column),
+                expected);
+  }
+  out = *value;
+  return {};
+}
+
+template <typename Number>
+Result<void> take_number(const Columns& columns, std::size_t column, std::string_view expected,
+                         Number& out) {
+  return take(columns, column, number<Number>(columns.at(column)), expected, out);
+}
+
+/// The columns between pose and covariance.
+Result<void> take_account(const Columns& columns, PoseEstimate& out) {
+  const auto status = named(columns.at(kStatusColumn), TrackingStatus::kLost);
+  const auto source = named(columns.at(kSourceColumn), PoseSource::kConstantVelocity);
+  return take(columns, kStatusColumn, status, "status", out.status)
+      .and_then([&] { return take(columns, kSourceColumn, source, "source", out.source); })
+      .and_then([&] { return take_number(columns, kQualityColumn, "quality", out.quality); })
+      .and_then([&] { return take_number(columns, kResetColumn, "count", out.reset_counter); })
+      .and_then([&] { return take_number(columns, kMapColumn, "part of a map", out.map_id); });
 }
 
 Result<PoseEstimate> parse_line(std::string_view line) {
@@ -118,16 +152,16 @@ Result<PoseEstimate> parse_line(std::string_view line) {
     return fail(ErrorCode::kInvalidData, "column 1: '{}' is not a time in integer nanoseconds",
                 columns->front());
   }
-  const auto status = status_of(columns->at(kStatusColumn));
-  if (!status) {
-    return fail(ErrorCode::kInvalidData, "column {}: '{}' is no status", kStatusColumn + 1,
-                columns->at(kStatusColumn));
-  }
+  PoseEstimate estimate;
+  estimate.t = HostTime{Duration{*t}};
   std::array<double, kStatusColumn - kPoseColumn> pose{};  // x y z qw qx qy qz
   std::array<double, kCovarianceValues> upper{};
-  auto read = take_numbers(*columns, kPoseColumn, pose.size(), pose.data()).and_then([&] {
-    return take_numbers(*columns, kCovarianceColumn, upper.size(), upper.data());
-  });
+  auto read =
+      take_account(*columns, estimate)
+          .and_then([&] { return take_numbers(*columns, kPoseColumn, pose.size(), pose.data()); })
+          .and_then([&] {
+            return take_numbers(*columns, kCovarianceColumn, upper.size(), upper.data());
+          });
   if (!read) {
     return tl::unexpected{std::move(read).error()};
   }
@@ -135,9 +169,6 @@ Result<PoseEstimate> parse_line(std::string_view line) {
   if (!(std::abs(q.norm() - 1) <= kNormTolerance)) {
     return fail(ErrorCode::kInvalidData, "the quaternion's norm is {:.9g} instead of 1", q.norm());
   }
-  PoseEstimate estimate;
-  estimate.t = HostTime{Duration{*t}};
-  estimate.status = *status;
   estimate.T_odom_base = SE3{q, Vector3d{pose[0], pose[1], pose[2]}};
   std::size_t next = 0;
   for (Eigen::Index row = 0; row < estimate.covariance.rows(); ++row) {

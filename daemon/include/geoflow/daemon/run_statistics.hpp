@@ -37,8 +37,8 @@ class StageTimer final : public slam::StageObserver {
  public:
   void begin(slam::Stage stage) override;
   void end(slam::Stage stage) override;
-  [[nodiscard]] TimeSummary summary(slam::Stage stage) const noexcept {
-    return histograms_[static_cast<std::size_t>(stage)].summary();
+  [[nodiscard]] const TimeHistogram& histogram(slam::Stage stage) const noexcept {
+    return histograms_[static_cast<std::size_t>(stage)];
   }
 
  private:
@@ -67,6 +67,8 @@ struct RunStatistics {
 [[nodiscard]] nlohmann::json to_json(const TimeSummary& summary);
 /// The keys "frames", "tracked", "by_status", "drops", "rejected" and "times_ms" of docs/cli.md.
 [[nodiscard]] nlohmann::json to_json(const RunStatistics& statistics);
+/// The key "time_histograms_ms" of docs/cli.md.
+[[nodiscard]] nlohmann::json histograms_to_json(const RunStatistics& statistics);
 /// The key "synchroniser" of docs/cli.md.
 [[nodiscard]] nlohmann::json to_json(const timesync::SynchroniserCounters& counters);
 

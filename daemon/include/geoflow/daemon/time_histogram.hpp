@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "geoflow/hal/time.hpp"
 
@@ -18,6 +19,13 @@ struct TimeSummary {
   double max_ms = 0;
 };
 
+/// So many durations of at least `lower_ms` and less than `upper_ms`.
+struct TimeBucket {
+  double lower_ms = 0;
+  double upper_ms = 0;
+  std::uint64_t count = 0;
+};
+
 /// How long something took, over a whole run: log-linear buckets of 3 % width from 1 us to 67 s (as
 /// HdrHistogram's), so percentiles are within 3 %; count, mean and maximum are exact. One thread
 /// adds, any may read; no allocation, no lock.
@@ -25,6 +33,8 @@ class TimeHistogram {
  public:
   void add(Duration duration) noexcept;
   [[nodiscard]] TimeSummary summary() const noexcept;
+  /// The buckets that are not empty, in ascending order; the last possible one has no upper bound.
+  [[nodiscard]] std::vector<TimeBucket> buckets() const;
 
  private:
   static constexpr std::size_t kSubBuckets = 32;  ///< of one octave

@@ -5,9 +5,12 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "geoflow/hal/result.hpp"
 
-/// Figures for reports: a grid of axes with lines, as PNG or SVG. Plain values in, a file out.
+/// Figures for reports: a grid of axes with lines, as PNG or SVG, or as data for a page's script
+/// that draws them. Plain values in, a file or data out.
 namespace geoflow::tools {
 
 /// Red, green, blue, each 0 to 1.
@@ -71,5 +74,17 @@ struct Figure {
 /// Thread-safe. Errors: another ending, a size outside 100 to 10000 px, series whose lists differ
 /// in length, a file that cannot be written.
 [[nodiscard]] Result<void> save_figure(const Figure& figure, const std::filesystem::path& path);
+
+/// The figure for a script that draws it: `columns`, and of each of `axes` its `title`, `x_label`,
+/// `y_label`, `value_label`, `equal`, `from_zero` and `series` (`label`, `color`, `width`,
+/// `dashed`, `x`, `y`, and where there are any `values`). Numbers have six digits, those that
+/// cannot be drawn are null. Of a long series only those points are left that its picture, 1000
+/// pixels wide, needs (U. Jugel et al., "M4: A Visualization-Oriented Time Series Data
+/// Aggregation", VLDB 2014): of a thousandth of it the first, the last, and those furthest out.
+/// Pure. Precondition: no axis is logarithmic, lists of equal length in every series.
+[[nodiscard]] nlohmann::json to_json(const Figure& figure);
+
+/// The colours of `values` in save_figure(), from least to largest, evenly spaced.
+[[nodiscard]] nlohmann::json color_map_json();
 
 }  // namespace geoflow::tools

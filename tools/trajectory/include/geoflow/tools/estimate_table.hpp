@@ -18,9 +18,9 @@ namespace geoflow::tools {
 [[nodiscard]] Result<void> write_estimates(const std::filesystem::path& path,
                                            const std::vector<PoseEstimate>& estimates);
 
-/// Reads such a file: time, pose, status and covariance of each estimate, in ascending order of
-/// time. Errors name file and line: a missing or unreadable file, another number of columns, text
-/// that is no finite number or status, a quaternion whose norm is not 1, times that do not ascend.
+/// Reads all that such a file holds of each estimate, in ascending order of time. Errors name file
+/// and line: a missing or unreadable file, another number of columns, text that is no finite
+/// number, status or source, a quaternion whose norm is not 1, times that do not ascend.
 [[nodiscard]] Result<std::vector<PoseEstimate>> read_estimates(const std::filesystem::path& path);
 
 }  // namespace geoflow::tools
