@@ -48,7 +48,8 @@ struct FlowConfig {
 
 /// Pose of one frame against the map (IV-B, IV-C).
 struct PoseConfig {
-  double pixel_sigma = 1.0;         ///< least standard deviation of a tracked feature [px]
+  /// Least standard deviation of a tracked feature [px]: that within which a patch tells its place.
+  double pixel_sigma = 0.3;
   int minimum_visual_inliers = 15;  ///< fewer do not count as a visual fix
   double pnp_threshold_px = 3.0;    ///< RANSAC inlier distance [px]
   int map_targets = 3;              ///< keyframes that a frame's depth is registered to at once
