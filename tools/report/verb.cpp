@@ -147,12 +147,13 @@ Result<void> ReportVerb::add_accuracy(ReportContent& content) const {
     content.warnings.push_back("No comparison with the truth: " + truth.error().message);
     return {};
   }
-  if (!*truth) {
+  const auto& reference = *truth;
+  if (!reference) {
     content.warnings.emplace_back(
         "No comparison with the truth: none lies with the recording (--reference names one).");
     return {};
   }
-  auto accuracy = measure_accuracy(content.run, **truth);
+  auto accuracy = measure_accuracy(content.run, *reference);
   if (accuracy) {
     take(*std::move(accuracy), content);
   } else {
