@@ -120,7 +120,7 @@ TEST_F(MapBuilderTest, TheAdjustmentHoldsWhatTheWindowIsReckonedFrom) {
         .from = before, .to = newest, .T_from_to = SE3{}, .information = Matrix6d::Identity()};
     map_.add_edge(*map_.keyframe(newest).reckoned);
   }
-  // Old keyframes that look firmly tied to the window: more of them than are held.
+  // As many old keyframes as are held are tied to the window more firmly than the one before it.
   for (int i = 0; i < config.mapping.fixed; ++i) {
     for (int times = 0; times < 2; ++times) {
       map_.add_edge({.from = std::next(map_.keyframes().begin(), i)->first,
