@@ -164,6 +164,19 @@ void bind_socket(SocketConfig& c, std::vector<Key>& keys) {
   keys.push_back({"socket.stall_timeout_s", &c.stall_timeout, 0.05, 3600});
 }
 
+void bind_ros(RosConfig& c, std::vector<Key>& keys) {
+  keys.push_back({"ros.publish", &c.publish});
+  keys.push_back({"ros.interface", &c.publisher.interface});
+  keys.push_back({"ros.domain", &c.publisher.domain, 0, 230});
+  keys.push_back({"ros.name", &c.publisher.name});
+  keys.push_back({"ros.map_frame", &c.publisher.map_frame});
+  keys.push_back({"ros.odom_frame", &c.publisher.odom_frame});
+  keys.push_back({"ros.base_frame", &c.publisher.base_frame});
+  keys.push_back({"ros.rate_hz", &c.rate_hz, 0, 1000});
+  keys.push_back({"ros.velocity_sigma_mps", &c.velocity_sigma_mps, 1e-6, 100});
+  keys.push_back({"ros.angular_velocity_sigma_radps", &c.angular_velocity_sigma_radps, 1e-6, 100});
+}
+
 void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
   keys.push_back({"pipeline.packet_queue", &c.packet_queue, 1, 64});
   keys.push_back({"pipeline.image_queue", &c.image_queue, 2, 64});
@@ -188,6 +201,7 @@ std::vector<Key> bind_keys(Config& config) {
   bind_synchroniser(config.synchroniser, keys);
   bind_slam(config.slam, keys);
   bind_socket(config.socket, keys);
+  bind_ros(config.ros, keys);
   bind_pipeline(config.pipeline, keys);
   bind_map(config.map, keys);
   return keys;

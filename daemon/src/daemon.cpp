@@ -21,12 +21,14 @@
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
 #include "geoflow/daemon/version.hpp"
+#include "geoflow/drivers/ros_publisher.hpp"
 #include "geoflow/hal/exit_code.hpp"
 #include "geoflow/hal/log.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
+#include "bus/ros_bus.hpp"
 #include "config/reload.hpp"
 #include "map/map_commands.hpp"
 #include "map/map_job.hpp"
@@ -48,6 +50,12 @@ namespace {
 constexpr auto kHousekeepingPeriod = std::chrono::milliseconds{100};
 constexpr auto kLastWords = std::chrono::seconds{1};  // that clients get to read the last pose
 
+/// What of a configuration can be judged before anything is opened.
+Result<void> check(const Config& config) {
+  return check_source(config).and_then(
+      [&] { return drivers::RosPublisher::check(config.ros.publisher); });
+}
+
 /// The daemon's objects and how they are wired. All on one thread, the loop's.
 class Daemon {
  public:
@@ -61,6 +69,7 @@ class Daemon {
   Result<void> start(service::GivenSockets given) {
     return watch_signals()
         .and_then([&] { return open_sockets(std::move(given)); })
+        .and_then([this] { return start_bus(); })
         .and_then([this] { return start_worker(); })
         .and_then([this] {
           return loop_->add(bell_.fd(), EPOLLIN, [this](std::uint32_t /*events*/) { on_bell(); });
@@ -110,6 +119,13 @@ class Daemon {
     return {};
   }
 
+  Result<void> start_bus() {
+    if (!config_.ros.publish) {
+      return {};
+    }
+    return bus::RosBus::start(config_.ros).map([this](auto started) { bus_ = std::move(started); });
+  }
+
   Result<void> start_worker() {
     auto worker = Worker::start(config_, bell_, resets_);
     return std::move(worker).map([this](auto made) { worker_ = std::move(made); });
@@ -126,8 +142,8 @@ class Daemon {
       resets_ = pose->reset_counter;
       publish(*pose);
     }
-    if (const auto pose = worker_->take_propagated(); pose && poses_) {
-      poses_->publish(*pose);
+    if (const auto pose = worker_->take_propagated()) {
+      publish_propagated(*pose);
     }
     if (ended && !leaving_) {
       running_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
@@ -151,6 +167,18 @@ class Daemon {
     }
     if (control_) {
       control_->publish(pose);
+    }
+    if (bus_) {
+      bus_->publish(pose);
+    }
+  }
+
+  void publish_propagated(const geoflow_pose& pose) {
+    if (poses_) {
+      poses_->publish(pose);
+    }
+    if (bus_) {
+      bus_->publish(pose);
     }
   }
 
@@ -189,7 +217,7 @@ class Daemon {
   Result<nlohmann::json> reload() {
     reporter_.reloading();
     auto reloaded = read_config_().and_then([this](const Config& read) {
-      return check_source(read).map([&] { return take_over(read, config_, running_); });
+      return check(read).map([&] { return take_over(read, config_, running_); });
     });
     reporter_.reloaded();
     if (!reloaded) {
@@ -263,7 +291,13 @@ class Daemon {
       if (seen.trouble.empty() && !map_.trouble().empty()) {
         seen.trouble = "the map is not saved: " + map_.trouble();
       }
+      if (seen.trouble.empty() && bus_ && !bus_->trouble().empty()) {
+        seen.trouble = "ROS 2 is not told: " + bus_->trouble();
+      }
       reporter_.tell(seen, now);
+      if (bus_) {
+        bus_->report(seen, reporter_.told());
+      }
     }
   }
 
@@ -275,6 +309,11 @@ class Daemon {
     status["peak_memory_mib"] = peak_memory_mib();
     status["pose_socket"] = poses_ ? poses_->status() : nlohmann::json{};
     status["control_clients"] = control_->client_count();
+    if (bus_) {
+      status["ros"] = {{"trouble", bus_->trouble()},
+                       {"published", bus_->published()},
+                       {"readers", bus_->readers()}};
+    }
     status["summary"] = reporter_.told();
     status["pose"] = newest_ ? pose_to_json(*newest_) : nlohmann::json{};
     status["map"] = map_.status(HostClock::now());
@@ -308,6 +347,7 @@ class Daemon {
     control_->conclude(asker, outcome);
   }};
   std::uint32_t resets_ = 0;
+  std::unique_ptr<bus::RosBus> bus_;  // null: not published
   std::unique_ptr<Worker> worker_;
   std::optional<geoflow_pose> newest_;
   service::Reporter reporter_{service::watchdog_period()};

@@ -70,8 +70,6 @@ class Publisher {
   /// Readers of the topic that are known now.
   [[nodiscard]] virtual std::uint32_t readers() const = 0;
 };
-/// Of all readers and publishers of a process in one domain, the first that names an interface
-/// makes the domain, and ends it for all when it goes.
 [[nodiscard]] Result<std::unique_ptr<Publisher>> make_publisher(const Address& address);
 
 }  // namespace geoflow::drivers::dds

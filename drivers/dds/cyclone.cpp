@@ -4,15 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
-#include <fmt/core.h>
-#include <net/if.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <tl/expected.hpp>
@@ -24,6 +21,7 @@
 
 #include "dds/channel.hpp"
 #include "dds/low_state.hpp"
+#include "dds/session.hpp"
 
 // Made by idlc from LowState.idl; its header would drag C into the includes of this part.
 // NOLINTNEXTLINE(readability-identifier-naming,bugprone-reserved-identifier): as idlc names it
@@ -37,79 +35,28 @@ constexpr std::size_t kBatch = 64;
 constexpr dds_duration_t kLongestBlock =
     std::chrono::nanoseconds{std::chrono::milliseconds{100}}.count();
 
-/// One entity of Cyclone DDS; deleting one deletes what was made of it.
-class Entity {
- public:
-  Entity() = default;
-  explicit Entity(dds_entity_t handle) noexcept : handle_{handle} {}
-  Entity(Entity&& other) noexcept : handle_{std::exchange(other.handle_, 0)} {}
-  Entity& operator=(Entity&& other) noexcept {
-    std::swap(handle_, other.handle_);
-    return *this;
-  }
-  Entity(const Entity&) = delete;
-  Entity& operator=(const Entity&) = delete;
-  ~Entity() {
-    if (handle_ > 0) {
-      (void)::dds_delete(handle_);
-    }
-  }
-  [[nodiscard]] dds_entity_t get() const noexcept { return handle_; }
-  [[nodiscard]] explicit operator bool() const noexcept { return handle_ > 0; }
-
- private:
-  dds_entity_t handle_ = 0;
-};
-
-tl::unexpected<Error> refused(const Address& address, std::string_view what, dds_return_t code) {
-  return fail(ErrorCode::kUnavailable, "{}: {}: {}", address.to_string(), what,
-              ::dds_strretcode(code));
-}
-
-/// A domain with its participant and topic.
-struct Session {
-  Entity domain;  // none where another part of the process has made it
-  Entity participant;
-  dds_entity_t topic = 0;
-};
-
-Result<Session> open_session(const Address& address) {
-  Session session;
-  if (!address.interface.empty()) {
-    if (::if_nametoindex(address.interface.c_str()) == 0) {
-      return fail(ErrorCode::kNotFound, "{}: no such network interface", address.to_string());
-    }
-    const std::string settings = fmt::format(
-        "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"{}\"/>"
-        "</Interfaces></General></Domain></CycloneDDS>",
-        address.interface);
-    session.domain = Entity{::dds_create_domain(address.domain, settings.c_str())};
-    const dds_return_t code = session.domain.get();
-    if (!session.domain && code != DDS_RETCODE_PRECONDITION_NOT_MET) {
-      return refused(address, "the interface cannot be used (has it an address?)", code);
-    }
-  }
-  session.participant = Entity{::dds_create_participant(address.domain, nullptr, nullptr)};
-  if (!session.participant) {
-    return refused(address, "DDS cannot be joined", session.participant.get());
-  }
-  session.topic = ::dds_create_topic(session.participant.get(), &unitree_go_msg_dds__LowState__desc,
-                                     address.topic.c_str(), nullptr, nullptr);
-  if (session.topic < 0) {
-    return refused(address, "is no topic", session.topic);
-  }
-  return session;
-}
-
-struct QosDeleter {
-  void operator()(dds_qos_t* qos) const noexcept { ::dds_delete_qos(qos); }
-};
-
-std::unique_ptr<dds_qos_t, QosDeleter> make_qos(dds_reliability_kind_t reliability) {
-  std::unique_ptr<dds_qos_t, QosDeleter> qos{::dds_create_qos()};
+Qos make_qos(dds_reliability_kind_t reliability) {
+  Qos qos{::dds_create_qos()};
   ::dds_qset_reliability(qos.get(), reliability, kLongestBlock);
   ::dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kHistory);
   return qos;
+}
+
+/// A session with the topic of the robot's messages.
+struct LowStateSession : Session {
+  dds_entity_t topic = 0;
+};
+
+Result<LowStateSession> open_session(const Address& address) {
+  auto session = join(address);
+  if (!session) {
+    return tl::unexpected{std::move(session.error())};
+  }
+  const auto topic = open_topic(*session, address, unitree_go_msg_dds__LowState__desc);
+  if (!topic) {
+    return tl::unexpected{topic.error()};
+  }
+  return LowStateSession{*std::move(session), *topic};
 }
 
 /// Hands the bytes of one message over.
@@ -128,7 +75,7 @@ class Subscriber final : public Channel {
 
   Result<void> open() override {
     guard_.store(0);
-    session_ = {};
+    session_.reset();
     auto session = open_session(address_);
     if (!session) {
       return tl::unexpected{std::move(session.error())};
@@ -144,7 +91,7 @@ class Subscriber final : public Channel {
         ::dds_waitset_attach(waitset_, guard, 0) != DDS_RETCODE_OK) {
       return refused(address_, "cannot be read", condition_ < 0 ? condition_ : DDS_RETCODE_ERROR);
     }
-    session_ = *std::move(session);
+    session_.emplace(*std::move(session));
     guard_.store(guard);
     return {};
   }
@@ -197,7 +144,7 @@ class Subscriber final : public Channel {
  private:
   Address address_;
   UniqueFd bell_;  // readable while woken, for pause()
-  Session session_;
+  std::optional<LowStateSession> session_;
   dds_entity_t reader_ = 0;
   dds_entity_t condition_ = 0;
   dds_entity_t waitset_ = 0;
@@ -206,7 +153,7 @@ class Subscriber final : public Channel {
 
 class CyclonePublisher final : public Publisher {
  public:
-  CyclonePublisher(Session session, dds_entity_t writer, Address address)
+  CyclonePublisher(LowStateSession session, dds_entity_t writer, Address address)
       : session_{std::move(session)}, writer_{writer}, address_{std::move(address)} {}
 
   Result<void> write(const LowState& state) override {
@@ -224,7 +171,7 @@ class CyclonePublisher final : public Publisher {
   }
 
  private:
-  Session session_;
+  LowStateSession session_;
   dds_entity_t writer_;
   Address address_;
 };

@@ -59,7 +59,7 @@ LIBRARIES = (
     Library("V4L2", r"linux/(videodev2|uvcvideo|media)\.h", (), ("drivers/v4l2",)),
     Library("SocketCAN", r"linux/can", (), ("drivers/can",)),
     Library("OpenNI2", r"(Driver/)?(OpenNI|Oni[A-Za-z]+)\.h", ("PkgConfig::OPENNI2",), ("drivers/openni2",)),
-    Library("DDS", r"dds/", ("CycloneDDS::ddsc", "CycloneDDS-CXX::ddscxx"), ("drivers/dds",)),
+    Library("DDS", r"dds/|RosMessages\.h", ("CycloneDDS::ddsc", "CycloneDDS-CXX::ddscxx"), ("drivers/dds",)),
     # Only for tests, as tools or as what to compare with.
     Library("GoogleTest", r"(gtest|gmock)/",
             ("GTest::gtest", "GTest::gmock", "GTest::gtest_main", "GTest::gmock_main"), ()),
@@ -99,6 +99,9 @@ THREAD_FILES = (
     "drivers/replay/prefetcher.cpp",  # decodes images ahead of the replay
     "drivers/replay/prefetcher.hpp",
     "drivers/replay/recorded_streams.cpp",  # paced replay waits for the next stamp, interruptibly
+    "drivers/dds/session.cpp",  # what a process has joined is one table for all its threads
+    "daemon/bus/ros_bus.cpp",  # tells ROS 2 machines, where DDS may block, on a thread of its own
+    "daemon/bus/ros_bus.hpp",
     "daemon/pipeline/pipeline.cpp",  # makes the live pipeline's threads
     "daemon/map/map_keeper.cpp",  # makes the thread that writes the map
     "daemon/map/map_keeper.hpp",

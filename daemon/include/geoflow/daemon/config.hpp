@@ -10,6 +10,7 @@
 #include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/dds_robot.hpp"
 #include "geoflow/drivers/recording.hpp"
+#include "geoflow/drivers/ros_publisher.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/config.hpp"
@@ -67,6 +68,15 @@ struct SocketConfig {
       std::chrono::seconds{5};  ///< a client that reads nothing for so long is cut off
 };
 
+/// The pose for machines that run ROS 2 (docs/ros.md).
+struct RosConfig {
+  bool publish = false;
+  drivers::RosPublisherOptions publisher{};
+  double rate_hz = 50;              ///< of poses, at most; 0: every one
+  double velocity_sigma_mps = 0.1;  ///< standard deviation that the twist is given, each direction
+  double angular_velocity_sigma_radps = 0.1;
+};
+
 /// Threads and queues of the live pipeline.
 struct PipelineConfig {
   int packet_queue = 4;     ///< packets that may wait for the estimator; one more drops the oldest
@@ -91,6 +101,7 @@ struct Config {
   timesync::SynchroniserConfig synchroniser;
   slam::Config slam;
   SocketConfig socket;
+  RosConfig ros;
   PipelineConfig pipeline;
   MapConfig map;
 };
