@@ -44,7 +44,7 @@ constexpr std::array<Metering, 3> kMeterings{{{.before_s = 0.1, .weight = 0.5},
                                               {.before_s = 0.45, .weight = 0.2}}};
 
 // NOLINTBEGIN(readability-magic-numbers): the last two of each row are its range
-constexpr std::array<Knob<CameraOptions>, 16> kKnobs{{
+constexpr std::array<Knob<CameraOptions>, 17> kKnobs{{
     {.name = "camera.width",
      .unit = "px",
      .summary = "width of all images",
@@ -107,7 +107,7 @@ constexpr std::array<Knob<CameraOptions>, 16> kKnobs{{
      .maximum = 0.05},
     {.name = "camera.depth_noise_scale",
      .unit = "1",
-     .summary = "times the deviation of disparity",
+     .summary = "times all errors of disparity",
      .member = &CameraOptions::depth_noise_scale,
      .minimum = 0,
      .maximum = 20},
@@ -121,6 +121,12 @@ constexpr std::array<Knob<CameraOptions>, 16> kKnobs{{
      .unit = "px",
      .summary = "deviation of disparity where the pattern is well seen",
      .member = &CameraOptions::depth_subpixel_px,
+     .minimum = 0,
+     .maximum = 2},
+    {.name = "camera.depth_calibration_px",
+     .unit = "px",
+     .summary = "deviation of disparity at 640 x 480 that calibration leaves in all frames",
+     .member = &CameraOptions::depth_calibration_px,
      .minimum = 0,
      .maximum = 2},
     {.name = "camera.depth_min_m",

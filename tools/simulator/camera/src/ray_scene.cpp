@@ -109,6 +109,25 @@ void intersect(RTCScene scene, const Valid& valid, RayPacket& packet) {
   rtcIntersect16(aligned.data(), scene, &context, &packet);
 }
 
+/// Part of a ray, by its distance.
+struct Stretch {
+  float enters;
+  float leaves;
+};
+
+/// Between two planes across one axis: of a ray from there, that goes so far along it.
+[[gnu::always_inline]] inline Stretch crossing(float from, float along, float low, float high) {
+  const float inverse = 1.0F / along;
+  const float to_low = (low - from) * inverse;
+  const float to_high = (high - from) * inverse;
+  return {.enters = std::min(to_low, to_high), .leaves = std::max(to_low, to_high)};
+}
+
+/// What both have; `b` counts for nothing where it is not a number.
+[[gnu::always_inline]] inline Stretch common(const Stretch& a, const Stretch& b) {
+  return {.enters = std::max(a.enters, b.enters), .leaves = std::min(a.leaves, b.leaves)};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<RayScene>> RayScene::create(const Scene& scene) {
@@ -121,6 +140,8 @@ Result<std::unique_ptr<RayScene>> RayScene::create(const Scene& scene) {
   made->standing_.reset(rtcNewScene(made->device_.get()));
   // It is built once and traced millions of times a frame.
   rtcSetSceneBuildQuality(made->standing_.get(), RTC_BUILD_QUALITY_HIGH);
+  // Rays between two facets that touch meet one of them.
+  rtcSetSceneFlags(made->standing_.get(), RTC_SCENE_FLAG_ROBUST);
   made->add_patches();
   made->add_capsules();
   rtcCommitScene(made->standing_.get());
@@ -274,20 +295,12 @@ Valid RayScene::near_people(const Valid& valid, const RayPacket& packet) const {
     std::array<int, kPacket> found{};
     for (const Box& box : people_boxes_) {
       for (std::size_t i = 0; i < kPacket; ++i) {
-        float enters = ray.tnear[i];
-        float leaves = ray.tfar[i];
-        const auto pass = [&](float from, float along, float low, float high)
-                              __attribute__((always_inline)) {
-                                const float inverse = 1.0F / along;
-                                const float to_low = (low - from) * inverse;
-                                const float to_high = (high - from) * inverse;
-                                enters = std::max(enters, std::min(to_low, to_high));
-                                leaves = std::min(leaves, std::max(to_low, to_high));
-                              };
-        pass(ray.org_x[i], ray.dir_x[i], box.low_m[0], box.high_m[0]);
-        pass(ray.org_y[i], ray.dir_y[i], box.low_m[1], box.high_m[1]);
-        pass(ray.org_z[i], ray.dir_z[i], box.low_m[2], box.high_m[2]);
-        found[i] |= enters <= leaves ? counts[i] : 0;
+        const Stretch whole{.enters = ray.tnear[i], .leaves = ray.tfar[i]};
+        const Stretch x = crossing(ray.org_x[i], ray.dir_x[i], box.low_m[0], box.high_m[0]);
+        const Stretch y = crossing(ray.org_y[i], ray.dir_y[i], box.low_m[1], box.high_m[1]);
+        const Stretch z = crossing(ray.org_z[i], ray.dir_z[i], box.low_m[2], box.high_m[2]);
+        const Stretch met = common(common(common(whole, x), y), z);
+        found[i] |= met.enters <= met.leaves ? counts[i] : 0;
       }
     }
     near = found;

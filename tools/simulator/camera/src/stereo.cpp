@@ -23,13 +23,15 @@ namespace {
 
 constexpr float kFaintSignal = 0.06F;    // where disparity's deviation is sqrt(2) of the best
 constexpr float kLeastSignal = 0.0045F;  // where half of the pixels have no measurement
-constexpr float kPitchX_px = 8.0F;
-constexpr float kPitchY_px = 6.0F;
+constexpr float kWindowX_px = 11.0F;     // where neighbours' errors are alike by a half
+constexpr float kWindowY_px = 7.0F;
+constexpr float kRipple_px = 0.012F;
+constexpr float kCalibratedWidth_px = 640.0F;  // an angle's error is fewer of coarser pixels
+constexpr float kCalibrationPitch = 0.25F;     // of the image's width
 constexpr float kRaggedPitch_px = 5.0F;
 constexpr float kRagged_px = 1.3F;  // how far an edge is seen beside its place
 constexpr float kStep_px = 1.0F;    // a jump of disparity that is an edge
 constexpr float kNever_px = std::numeric_limits<float>::infinity();
-constexpr float kWhiteShare = 0.05F;  // of the variance that is not correlated
 constexpr float kSubpixelSteps = 32.0F;
 constexpr float kHoleSpread = 0.5F;  // of log signal about the least
 
@@ -48,9 +50,18 @@ std::vector<float> true_disparity(const InfraredView& seen, float focal_baseline
   return std::sqrt(1.0F + ratio * ratio);
 }
 
+/// What a window that finds `disparity` adds to it, between whole pixels: a sine's likeness of two
+/// parabolas, above whole numbers upwards.
+[[gnu::always_inline]] inline float ripple_of(float disparity) noexcept {
+  constexpr float kSteepness = 8.0F;
+  const float beyond_half = disparity - static_cast<float>(whole_below(disparity)) - 0.5F;
+  return -kSteepness * kRipple_px * beyond_half * (1.0F - 2.0F * std::abs(beyond_half));
+}
+
 /// One row's worth of what is random.
 struct RandomRow {
   std::vector<float> noise;
+  std::vector<float> calibration;
   std::vector<float> holes;
   std::vector<float> aside;
   std::vector<float> above;
@@ -62,10 +73,10 @@ struct Stretch {
   int y = 0;
   int count = 0;
   Lanes signal{};
-  Lanes noise{};  ///< correlated
+  Lanes noise{};
+  Lanes calibration{};
   Lanes aside{};
   Lanes above{};
-  Lanes white{};  ///< not correlated
   Lanes chance{};
   Lanes between{};
 };
@@ -86,14 +97,18 @@ class Matcher {
         height_{intrinsics.height},
         focal_baseline_{static_cast<float>(intrinsics.fx * kD435iBaseline_m)},
         disparity_{true_disparity(seen, focal_baseline_)},
-        noise_{subkey(key, "disparity"), width_, height_, kPitchX_px, kPitchY_px},
-        holes_{subkey(key, "holes"), width_, height_, kPitchX_px, kPitchY_px},
+        noise_{subkey(key, "disparity"), width_, height_, kWindowX_px, kWindowY_px},
+        calibration_{subkey(options.seed, "stereo calibration"), width_, height_,
+                     kCalibrationPitch * static_cast<float>(width_),
+                     kCalibrationPitch * static_cast<float>(width_)},
+        holes_{subkey(key, "holes"), width_, height_, kWindowX_px, kWindowY_px},
         aside_{subkey(key, "aside"), width_, height_, kRaggedPitch_px, kRaggedPitch_px},
         above_{subkey(key, "above"), width_, height_, kRaggedPitch_px, kRaggedPitch_px} {}
 
   void row(int y, std::vector<float>& depth_m) const {
     RandomRow random;
     noise_.row(y, random.noise);
+    calibration_.row(y, random.calibration);
     holes_.row(y, random.holes);
     aside_.row(y, random.aside);
     above_.row(y, random.above);
@@ -120,6 +135,7 @@ class Matcher {
     const auto column = static_cast<std::size_t>(x);
     take(seen_->signal, index(x, y), count, stretch.signal);
     take(random.noise, column, count, stretch.noise);
+    take(random.calibration, column, count, stretch.calibration);
     take(random.aside, column, count, stretch.aside);
     take(random.above, column, count, stretch.above);
     with_wide_vectors([&]() __attribute__((always_inline)) {
@@ -127,7 +143,6 @@ class Matcher {
       const std::uint64_t first = index(x, y);
       for (std::size_t i = 0; i < kLanes; ++i) {
         const std::uint64_t bits = subkey(key, first + i);
-        stretch.white[i] = to_normal(scramble(bits));
         stretch.chance[i] = to_unit(bits);
         stretch.between[i] = to_unit(scramble(bits + 1));
       }
@@ -143,15 +158,16 @@ class Matcher {
                                        options_->depth_errors ? kStep_px : kNever_px);
       const auto scale = static_cast<float>(options_->depth_noise_scale);
       const float spread = scale * static_cast<float>(options_->depth_subpixel_px);
+      const float calibration = scale * static_cast<float>(options_->depth_calibration_px) *
+                                static_cast<float>(width_) / kCalibratedWidth_px;
       const bool rounds = scale > 0;
-      const float correlated = std::sqrt(1.0F - kWhiteShare);
-      const float white = std::sqrt(kWhiteShare);
       const auto nearest_m = static_cast<float>(options_->depth_min_m);
       const auto farthest_m = static_cast<float>(options_->depth_max_m);
       const float focal_baseline = focal_baseline_;
       for (std::size_t i = 0; i < kLanes; ++i) {
-        const float noise = correlated * stretch.noise[i] + white * stretch.white[i];
-        const float noisy = found[i] + spread * spread_of(stretch.signal[i]) * noise;
+        const float matched = found[i] + spread * spread_of(stretch.signal[i]) * stretch.noise[i] +
+                              calibration * stretch.calibration[i];
+        const float noisy = matched + scale * ripple_of(matched);
         const float stepped =
             static_cast<float>(whole_below(kSubpixelSteps * noisy + 0.5F)) / kSubpixelSteps;
         const float disparity = rounds ? stepped : noisy;
@@ -166,9 +182,8 @@ class Matcher {
 
   /// The disparities that windows find: beside a step it may be the neighbour's, something between,
   /// or nothing (0). An edge is ragged by `ragged_px`; a step is one of disparity by `step_px`.
-  [[nodiscard, gnu::always_inline]] inline Lanes beside_edges(const Stretch& stretch,
-                                                              float ragged_px,
-                                                              float step_px) const {
+  [[nodiscard, gnu::always_inline]] Lanes beside_edges(const Stretch& stretch, float ragged_px,
+                                                       float step_px) const {
     constexpr float kNothing = 0.35F;
     constexpr float kBetween = 0.5F;
     const float* const disparities = disparity_.data();
@@ -189,8 +204,14 @@ class Matcher {
       const float right = disparity_at(x + 1, y);
       const float over = disparity_at(x, y - 1);
       const float under = disparity_at(x, y + 1);
-      const float nearest = std::max(here, std::max(std::max(left, right), std::max(over, under)));
-      const float farthest = std::min(here, std::min(std::min(left, right), std::min(over, under)));
+      const float nearer_aside = std::max(left, right);
+      const float nearer_above = std::max(over, under);
+      const float nearer = std::max(nearer_aside, nearer_above);
+      const float nearest = std::max(here, nearer);
+      const float farther_aside = std::min(left, right);
+      const float farther_above = std::min(over, under);
+      const float farther = std::min(farther_aside, farther_above);
+      const float farthest = std::min(here, farther);
       // A slanted surface has a slope, a step is more than both its sides' slopes.
       const bool step = nearest - farthest >= step_px && nearest + farthest - 2.0F * here != 0.0F;
       // Only an edge is ragged: a slanted surface is seen where it is.
@@ -246,16 +267,13 @@ class Matcher {
   float focal_baseline_;
   std::vector<float> disparity_;
   SmoothNoise noise_;
+  SmoothNoise calibration_;
   SmoothNoise holes_;
   SmoothNoise aside_;
   SmoothNoise above_;
 };
 
 }  // namespace
-
-float disparity_spread(float signal) noexcept {
-  return spread_of(signal);
-}
 
 std::vector<float> match_stereo(const InfraredView& seen, const CameraIntrinsics& intrinsics,
                                 const CameraOptions& options, std::uint64_t key) {

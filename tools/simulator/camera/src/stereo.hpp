@@ -11,26 +11,29 @@
 namespace geoflow::simulator {
 
 /// Depth as a D435i's stereo matcher measures it in the left infrared camera [m], row by row, 0
-/// where it has none.
-/// - Disparity d = f * 50 mm / z has a deviation of `depth_subpixel_px` where the pattern is well
-/// seen, more where it is faint:
-///   0.05 px * sqrt(1 + (0.06 / signal)^2); it is correlated over about 8 x 6 pixels. So depth errs
-///   with z^2.
-/// - No measurement: where the right camera sees something nearer or nothing, at the left border,
-/// where the signal is
-///   too faint, beside steps in depth, nearer than `depth_min_m` or farther than `depth_max_m`.
-/// - Beside steps, edges are ragged by a pixel or two, and some pixels lie between the two
-/// surfaces.
+/// where it has none. It errs in disparity d = f * 50 mm / z, thus in depth with z^2:
+/// - Matching: normal, of `depth_subpixel_px` where the pattern is well seen, more where it is
+///   faint: times sqrt(1 + (0.06 / signal)^2). Neighbours' windows overlap (L. Keselman et al.,
+///   "Intel RealSense stereoscopic depth cameras", CVPRW 2017): correlation falls to a half over 11
+///   x 7 pixels. Anew in each frame.
+/// - Between whole pixels windows find a little more above the whole number and less below the next
+///   one: a ripple of 0.012 px (A. Grunnet-Jepsen et al., "Subpixel linearity improvement for Intel
+///   RealSense depth camera D400 series", Intel).
+/// - What calibration leaves of distortion and rectification: `depth_calibration_px`, smooth over
+///   the image, the same in all frames.
 /// - Disparity comes in steps of 1/32 px (datasheet).
-/// The deviation and the lengths of correlation were fitted to the floor in real D435 recordings:
-/// 0.05 px from 0.75 to 1.25 m, 0.10 px at 2.25 m, 0.25 px at 3 m of a concrete floor seen at a
-/// grazing angle; and the faintest signal to that floor's holes, 1 percent from 2.5 to 3.5 m. `key`
-/// decides all that is random.
+///
+/// No measurement: where the right camera sees something nearer or nothing, at the left border,
+/// where the signal is too faint, beside steps in depth, nearer than `depth_min_m` or farther than
+/// `depth_max_m`. Beside steps, edges are ragged by a pixel or two, and some pixels lie between the
+/// two surfaces.
+///
+/// How noise grows with faintness, how far it is alike, and the ripple were measured on a concrete
+/// floor that a real D435 saw at a grazing angle; the faintest signal is that of its holes, 1
+/// percent from 2.5 to 3.5 m. `key` decides what is random in one frame, the options' seed what is
+/// the device's own.
 [[nodiscard]] std::vector<float> match_stereo(const InfraredView& seen,
                                               const CameraIntrinsics& intrinsics,
                                               const CameraOptions& options, std::uint64_t key);
-
-/// Deviation of disparity over its best for a signal.
-[[nodiscard]] float disparity_spread(float signal) noexcept;
 
 }  // namespace geoflow::simulator
