@@ -160,6 +160,7 @@ void bind_socket(SocketConfig& c, std::vector<Key>& keys) {
   keys.push_back({"socket.mode", &c.mode, 0, 0777});
   keys.push_back({"socket.group", &c.group});
   keys.push_back({"socket.clients", &c.clients, 1, 256});
+  keys.push_back({"socket.clients_per_user", &c.clients_per_user, 1, 256});
   keys.push_back({"socket.handshake_timeout_s", &c.handshake_timeout, 0.05, 60});
   keys.push_back({"socket.stall_timeout_s", &c.stall_timeout, 0.05, 3600});
 }

@@ -14,9 +14,12 @@
 namespace geoflow::daemon {
 namespace {
 
-constexpr std::array<std::string_view, 5> kAtRunTime = {
-    "source.loop", "socket.clients", "socket.handshake_timeout_s", "socket.stall_timeout_s",
-    "map.save_interval_s"};
+constexpr std::array<std::string_view, 6> kAtRunTime = {"source.loop",
+                                                        "socket.clients",
+                                                        "socket.clients_per_user",
+                                                        "socket.handshake_timeout_s",
+                                                        "socket.stall_timeout_s",
+                                                        "map.save_interval_s"};
 
 // Both are of keys of the same name, and so of the same type.
 

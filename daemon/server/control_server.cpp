@@ -1,6 +1,5 @@
 #include "server/control_server.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -22,6 +21,7 @@
 
 #include "server/acceptor.hpp"
 #include "server/authority.hpp"
+#include "server/client_limit.hpp"
 #include "server/control_connection.hpp"
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
@@ -81,10 +81,9 @@ void ControlServer::on_connection(Connection connection) {
   const int fd = connection.fd.get();
   const HostTime now = HostClock::now();
   auto client = std::make_unique<ControlConnection>(std::move(connection), next_number_++, now);
-  if (clients_.size() >= static_cast<std::size_t>(config_.clients)) {
-    client->say(
-        {{"ok", false}, {"error", {{"code", "unavailable"}, {"message", "too many clients"}}}},
-        now);
+  if (const std::string why = reason_to_refuse(clients_, config_, client->peer().uid);
+      !why.empty()) {
+    client->say({{"ok", false}, {"error", {{"code", "unavailable"}, {"message", why}}}}, now);
     (void)client->flush(now);
     return;
   }
@@ -145,6 +144,7 @@ void ControlServer::conclude(const Asker& asker, const Result<nlohmann::json>& o
 
 void ControlServer::set_limits(const SocketConfig& config) {
   config_.clients = config.clients;
+  config_.clients_per_user = config.clients_per_user;
   config_.stall_timeout = config.stall_timeout;
 }
 

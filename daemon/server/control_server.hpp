@@ -37,7 +37,7 @@ class ControlServer {
   void publish(const geoflow_pose& pose);
   /// Answers a client that asked for a change, if it is still there.
   void conclude(const Asker& asker, const Result<nlohmann::json>& outcome);
-  /// From now on these limits hold (clients, stall_timeout).
+  /// From now on these limits hold (clients, clients_per_user, stall_timeout).
   void set_limits(const SocketConfig& config);
   /// Cuts off clients that read nothing for too long. To be called a few times a second.
   void check_timeouts();

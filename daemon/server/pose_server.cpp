@@ -29,6 +29,7 @@
 #include "geoflow/hal/unique_fd.hpp"
 
 #include "server/acceptor.hpp"
+#include "server/client_limit.hpp"
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
 #include "server/pose_connection.hpp"
@@ -106,9 +107,10 @@ void PoseServer::on_connection(Connection connection) {
   const int fd = connection.fd.get();
   auto client =
       std::make_unique<PoseConnection>(std::move(connection), next_id_++, HostClock::now());
-  if (clients_.size() >= static_cast<std::size_t>(config_.clients)) {
+  if (const std::string why = reason_to_refuse(clients_, config_, client->peer().uid);
+      !why.empty()) {
     ++refused_;
-    client->refuse(GEOFLOW_REFUSE_FULL, "too many clients");
+    client->refuse(GEOFLOW_REFUSE_FULL, why);
     return;
   }
   if (loop_.add(fd, EPOLLIN, [this, fd](std::uint32_t events) { on_ready(fd, events); })) {
@@ -191,6 +193,7 @@ void PoseServer::finish(geoflow_end_reason reason) {
 
 void PoseServer::set_limits(const SocketConfig& config) {
   config_.clients = config.clients;
+  config_.clients_per_user = config.clients_per_user;
   config_.handshake_timeout = config.handshake_timeout;
   config_.stall_timeout = config.stall_timeout;
   write_limits(config_, welcome_);

@@ -40,7 +40,7 @@ class PoseServer {
   void publish(const geoflow_pose& pose);
   /// Tells every client that nothing more follows, after what waits for it, and closes it.
   void finish(geoflow_end_reason reason);
-  /// From now on these limits hold (clients, handshake_timeout, stall_timeout).
+  /// From now on these limits hold (clients, clients_per_user, handshake_timeout, stall_timeout).
   void set_limits(const SocketConfig& config);
   /// Cuts off clients whose time is over. To be called a few times a second.
   void check_timeouts();

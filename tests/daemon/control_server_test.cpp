@@ -1,13 +1,21 @@
+#include <chrono>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include <grp.h>
-#include <sys/wait.h>
+#include <sys/stat.h>
+#include <sys/types.h>
+#include <unistd.h>
 
 #include "geoflow/daemon/control_client.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/unique_fd.hpp"
 
+#include "protocol/control_request.hpp"
+#include "server/acceptor.hpp"
 #include "server/authority.hpp"
 #include "server_fixture.hpp"
 
@@ -146,28 +154,22 @@ TEST_F(ServerTest, ControlForgetsTheChangeOfAClientThatHasGone) {
 /// What another user's process hears when it asks for a reload: written to a file by that process.
 nlohmann::json asked_as_nobody(const std::filesystem::path& control,
                                const std::filesystem::path& answer) {
-  constexpr uid_t kNobody = 65534;
-  const pid_t child = ::fork();
-  if (child == 0) {
-    std::ofstream file{answer};
-    const bool changed =
-        ::setgroups(0, nullptr) == 0 && ::setgid(kNobody) == 0 && ::setuid(kNobody) == 0;
+  std::ofstream file{answer};
+  EXPECT_TRUE(as_nobody([&] {
     auto client = ControlClient::connect(control);
-    if (!changed || !client) {
-      ::_exit(1);
+    if (!client) {
+      return false;
     }
     const auto reply = client->request({{"cmd", "reload"}}, std::chrono::seconds{5});
     const auto status = client->request({{"cmd", "status"}}, std::chrono::seconds{5});
     file << nlohmann::json{{"refused", reply ? "" : reply.error().message},
                            {"status", status ? *status : nlohmann::json{}}};
     file.close();
-    ::_exit(0);
-  }
-  int status = -1;
-  EXPECT_EQ(::waitpid(child, &status, 0), child);
-  EXPECT_EQ(status, 0);
-  std::ifstream file{answer};
-  return nlohmann::json::parse(file, nullptr, false);
+    return true;
+  }));
+  file.close();
+  std::ifstream heard{answer};
+  return nlohmann::json::parse(heard, nullptr, false);
 }
 
 TEST_F(ServerTest, ControlRefusesAnotherUsersChangesAndAnswersHisQuestions) {

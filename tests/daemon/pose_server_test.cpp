@@ -157,6 +157,36 @@ TEST_F(ServerTest, TooManyClientsAreRefusedAndThoseThereAreServed) {
   static_cast<void>(connect());
 }
 
+TEST_F(ServerTest, OneUserDoesNotTakeTheRoomOfOthers) {
+  config_.clients_per_user = 2;
+  on_loop([this] {
+    poses_->set_limits(config_);
+    control_->set_limits(config_);
+  });
+  PoseClient first = connect();
+  const PoseClient second = connect();
+  const auto third = PoseClient::connect(config_.pose, {.name = "third"});
+  ASSERT_FALSE(third);
+  EXPECT_EQ(third.error().code, ErrorCode::kUnavailable);
+  const std::string user = std::to_string(::geteuid());
+  EXPECT_THAT(third.error().message, HasSubstr("too many clients of user " + user));
+  const std::array controls = {raw_socket(config_.control, SOCK_STREAM),
+                               raw_socket(config_.control, SOCK_STREAM),
+                               raw_socket(config_.control, SOCK_STREAM)};
+  EXPECT_TRUE(LineReader{controls[0].get()}.next()->contains("hello"));
+  EXPECT_EQ((*LineReader{controls[2].get()}.next())["error"]["message"],
+            "too many clients of user " + user);
+  publish(3);
+  EXPECT_EQ(next(first)->pose.frame, 3U);
+  if (::geteuid() == 0) {
+    ::chmod(config_.pose.c_str(), 0666);
+    ::chmod(directory_.path().c_str(), 0755);
+    EXPECT_TRUE(as_nobody([this] {
+      return PoseClient::connect(config_.pose, {.name = "another user"}).has_value();
+    }));
+  }
+}
+
 TEST_F(ServerTest, AFloodingClientIsCutOffAndOthersAreServed) {
   PoseClient good = connect();
   const UniqueFd flood = raw_socket(config_.pose, SOCK_SEQPACKET);

@@ -16,6 +16,7 @@
 #include "geoflow/tools/bench/table.hpp"
 #include "geoflow/tools/console.hpp"
 
+#include "bench/clients_benchmark.hpp"
 #include "bench/gicp_benchmark.hpp"
 #include "bench/gicp_table.hpp"
 #include "bench/table_command.hpp"
@@ -32,9 +33,8 @@ constexpr std::string_view kExamples =
     "  geoflow bench replay kitchen-400 --csv           the same for a spreadsheet\n"
     "  geoflow bench gicp kitchen-400 --pairs 100       registration of depth frames beside "
     "PCL's, times and errors\n"
-    "  geoflow bench table --suite tum --data ~/tum     accuracy on a whole data set, in "
-    "the "
-    "paper's ablation rows\n"
+    "  geoflow bench clients kitchen-400                the daemon alone and among 64 clients\n"
+    "  geoflow bench table --suite tum --data ~/tum     accuracy on a data set, row by row\n"
     "  geoflow bench replay kitchen-400 --json          the same for scripts, with the "
     "machine\n"
     "How to measure so that figures can be compared: docs/benchmarks.md.";
@@ -52,11 +52,7 @@ class BenchVerb final : public Verb {
     command.require_subcommand(1);
     replay_ = add(command, "replay", "Replay a recording: speed, memory, stage times");
     add_recording(*replay_);
-    replay_->add_option("--runs", runs_, "How many times")
-        ->check(CLI::Range(1, kMaxRuns))
-        ->capture_default_str();
-    replay_->add_option("--calibration", calibration_,
-                        "Folder with Kalibr files (default: the recording's)");
+    add_runs(*replay_);
     gicp_ = add(command, "gicp", "Register depth frame to frame, beside PCL");
     add_recording(*gicp_);
     gicp_->add_option("--reference", reference_,
@@ -64,13 +60,16 @@ class BenchVerb final : public Verb {
     gicp_->add_option("--pairs", pairs_, "Pairs of frames for each step")
         ->check(CLI::Range(1, kMaxPairs))
         ->capture_default_str();
+    clients_ = add(command, "clients", "Run the daemon alone and with 64 clients, some hostile");
+    add_recording(*clients_);
+    add_runs(*clients_);
     CLI::App* table = add(command, "table", "Run a whole data set in the paper's ablation rows");
     table->footer("Examples:\n" + std::string{TableCommand::examples()});
     table_.declare(*table);
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
-    if (!replay_->parsed() && !gicp_->parsed()) {
+    if (!replay_->parsed() && !gicp_->parsed() && !clients_->parsed()) {
       return table_.run(console);
     }
     return measure().map([&](const BenchTable& table) {
@@ -92,6 +91,14 @@ class BenchVerb final : public Verb {
     benchmark.add_flag("--csv", csv_, "Print CSV instead of a Markdown table");
   }
 
+  void add_runs(CLI::App& benchmark) {
+    benchmark.add_option("--runs", runs_, "How many times")
+        ->check(CLI::Range(1, kMaxRuns))
+        ->capture_default_str();
+    benchmark.add_option("--calibration", calibration_,
+                         "Folder with Kalibr files (default: the recording's)");
+  }
+
   [[nodiscard]] Result<BenchTable> measure() const {
     if (gicp_->parsed()) {
       GicpBenchmarkOptions options{.recording = recording_, .pairs = pairs_};
@@ -101,6 +108,12 @@ class BenchVerb final : public Verb {
       return run_gicp_table(options);
     }
     return own_program().and_then([&](const auto& program) {
+      if (clients_->parsed()) {
+        return run_clients_benchmark({.program = program.parent_path() / "geoflowd",
+                                      .recording = recording_,
+                                      .calibration = calibration_,
+                                      .runs = runs_});
+      }
       return run_replay_benchmark({.program = program,
                                    .recording = recording_,
                                    .calibration = calibration_,
@@ -122,6 +135,7 @@ class BenchVerb final : public Verb {
 
   CLI::App* replay_ = nullptr;
   CLI::App* gicp_ = nullptr;
+  CLI::App* clients_ = nullptr;
   TableCommand table_;
   std::string recording_;
   std::string calibration_;

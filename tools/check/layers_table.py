@@ -110,6 +110,9 @@ THREAD_FILES = (
     "daemon/src/signal_watch.cpp",  # blocks signals for all threads
     "daemon/src/worker.cpp",  # makes the thread of a lock-step run
     "daemon/src/worker.hpp",
+    "tools/bench/client_load.cpp",  # clients go on while the daemon is waited for
+    "tools/bench/client_load.hpp",
+    "tools/bench/clients_benchmark.cpp",  # asks the daemon how it is while its end is waited for
     "tools/record/live_recorder.cpp",  # the source delivers on a thread of its own while this one writes
     "tools/record/sample_queue.hpp",  # between the threads that bring samples and the one that writes them
 )

@@ -3,13 +3,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <set>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -19,6 +16,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/bench/processes.hpp"
+#include "geoflow/tools/bench/scratch_folder.hpp"
 #include "geoflow/tools/bench/table.hpp"
 
 namespace geoflow::tools {
@@ -27,30 +25,6 @@ namespace {
 using nlohmann::literals::operator""_json_pointer;
 
 constexpr int kMaxRuns = 1000;
-
-/// A folder for one run's outputs, removed at the end of scope.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::error_code ignored;
-    std::string pattern =
-        (std::filesystem::temp_directory_path(ignored) / "geoflow-bench-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) != nullptr) {
-      path_ = pattern;
-    }
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  /// Empty where none could be made.
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Runs the command alone and waits for its end.
 Result<void> run_command(std::vector<std::string> arguments) {

@@ -60,9 +60,10 @@ struct OpenNi2Config {
 struct SocketConfig {
   std::filesystem::path pose = "/run/geoflow/pose.sock";
   std::filesystem::path control = "/run/geoflow/ctl.sock";
-  int mode = 0660;    ///< permissions of both
-  std::string group;  ///< owning group of both; empty: the daemon's own
-  int clients = 32;   ///< at most, on each socket
+  int mode = 0660;            ///< permissions of both
+  std::string group;          ///< owning group of both; empty: the daemon's own
+  int clients = 32;           ///< at most, on each socket
+  int clients_per_user = 24;  ///< of them at most; the rest is for other users
   Duration handshake_timeout = std::chrono::seconds{2};  ///< for HELLO
   Duration stall_timeout =
       std::chrono::seconds{5};  ///< a client that reads nothing for so long is cut off
