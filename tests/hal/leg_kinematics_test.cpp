@@ -15,44 +15,12 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/samples.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/go2_check_values.hpp"
 
 namespace geoflow {
 namespace {
 
 constexpr std::array kLegs{Leg::kFrontRight, Leg::kFrontLeft, Leg::kRearRight, Leg::kRearLeft};
-
-/// Forward kinematics of Unitree's Go2 model, computed by MuJoCo.
-struct CheckValue {
-  Leg leg;
-  Vector3d q;
-  Vector3d foot;
-};
-
-// NOLINTBEGIN(modernize-use-std-numbers): coordinates, one of which is near 1 / pi
-std::array<CheckValue, 7> check_values() {
-  return {{{.leg = Leg::kFrontRight,
-            .q = {0, 0.9, -1.8},
-            .foot = {0.193400000, -0.142000000, -0.264805846}},
-           {.leg = Leg::kFrontLeft,
-            .q = {-0.1, 0.8, -1.5},
-            .foot = {0.177821520, 0.110443765, -0.319288753}},
-           {.leg = Leg::kRearRight,
-            .q = {0.5, -0.4, -0.9},
-            .foot = {0.094784000, -0.008936211, -0.267956786}},
-           {.leg = Leg::kRearLeft,
-            .q = {-0.6, 2.0, -2.6},
-            .foot = {-0.266811505, 0.076106889, -0.125857306}},
-           {.leg = Leg::kFrontRight,
-            .q = {-0.7, 0, -1.0},
-            .foot = {0.372633320, -0.330900197, -0.189409994}},
-           {.leg = Leg::kFrontRight,
-            .q = {0.35, 1.2, -2.2},
-            .foot = {0.174108994, -0.070282301, -0.213356732}},
-           {.leg = Leg::kRearLeft,
-            .q = {0.3, 0.5, -2.0},
-            .foot = {-0.083051208, 0.197427385, -0.164748253}}}};
-}
-// NOLINTEND(modernize-use-std-numbers)
 
 /// Angles within Go2's joint limits.
 Vector3d random_angles(std::mt19937_64& random) {
@@ -62,7 +30,7 @@ Vector3d random_angles(std::mt19937_64& random) {
 }
 
 TEST(LegKinematics, MeetsTheCheckValues) {
-  for (const CheckValue& check : check_values()) {
+  for (const tests::CheckValue& check : tests::go2_check_values()) {
     EXPECT_LT((foot_position(kGo2Legs, check.leg, check.q) - check.foot).norm(), 1e-9);
   }
   Matrix3d expected;

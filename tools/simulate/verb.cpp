@@ -24,6 +24,7 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/console.hpp"
 #include "geoflow/tools/interrupt.hpp"
+#include "geoflow/tools/simulator/camera.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 #include "geoflow/tools/simulator/simulation.hpp"
@@ -164,6 +165,7 @@ Result<ExitCode> SimulateVerb::make(Console& console) const {
     console.object({{"output", output_}, {"reused", true}});
     return ExitCode::kOk;
   }
+  simulator::keep_freed_memory();
   auto simulation = simulator::Simulation::create(*chosen);
   if (!simulation) {
     return tl::unexpected{std::move(simulation.error())};

@@ -18,6 +18,7 @@ namespace {
 
 void render(benchmark::State& state, const char* name) {
   constexpr double kRate_hz = 30.0;
+  keep_freed_memory();
   constexpr std::uint64_t kFirstFrame = 150;  // the robot walks
   const Scene scene = make_scene(name, 1, {}).value();
   const Walk walk = plan_walk(scene.path(), WalkOptions{}).value();

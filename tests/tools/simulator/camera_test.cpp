@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,6 +15,8 @@
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "camera_rig.hpp"
+#include "src/ray_scene.hpp"
+#include "src/view.hpp"
 
 namespace geoflow::simulator::tests {
 namespace {
@@ -232,6 +235,41 @@ TEST(Camera, PedestriansAreSeenWhereTheyWalk) {
   EXPECT_NEAR(truth_m(before, 316, 150), 8.0, 1e-3);
   EXPECT_NEAR(truth_m(passing, 316, 100), 3.0, 0.4);
   EXPECT_LT(blue(passing, 316, 100), 0.6 * blue(before, 316, 100));
+}
+
+TEST(RayScene, LimbsKeepTheirThicknessWhileTheyMove) {
+  constexpr float kBeside_m = 2.0F;
+  constexpr double kInterval_s = 0.05;
+  Scene scene = daylight_scene();
+  scene.materials.push_back({});
+  scene.pedestrians.emplace_back(Pedestrian::Walk{.waypoints = {{0, 0}, {50, 0}}});
+  const auto rays = RayScene::create(scene).value();
+  const Pedestrian& person = scene.pedestrians.front();
+  for (double t_s = 0; t_s < 1.5; t_s += 0.01) {
+    rays->move_people(t_s, t_s + kInterval_s);
+    const auto begin = person.body(t_s);
+    const auto end = person.body(t_s + kInterval_s);
+    for (const std::size_t shin : {1U, 7U}) {
+      const auto middle = [&](const auto& body) -> Eigen::Vector3f {
+        return 0.5F * (body[shin].start + body[shin].end);
+      };
+      const Eigen::Vector3f centre = 0.5F * (middle(begin) + middle(end));
+      const float radius_m = 0.5F * (begin[shin].start_radius_m + begin[shin].end_radius_m);
+      // From both sides: of two legs, one hides the other from one of them.
+      float nearest_m = kBeside_m;
+      for (const float side : {-1.0F, 1.0F}) {
+        RayPacket packet;
+        RayScene::reset(packet);
+        Valid valid{};
+        valid[0] = -1;
+        aim(packet, 0, centre + Eigen::Vector3f{0, side * kBeside_m, 0}, {0, -side, 0});
+        packet.ray.time[0] = 0.5F;
+        rays->trace(valid, packet);
+        nearest_m = std::min(nearest_m, std::abs(kBeside_m - radius_m - packet.ray.tfar[0]));
+      }
+      EXPECT_LT(nearest_m, 0.1F * radius_m) << t_s;
+    }
+  }
 }
 
 TEST(Camera, WhatTheRightInfraredCameraCannotSeeHasNoDepth) {

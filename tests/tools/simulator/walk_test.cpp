@@ -17,7 +17,9 @@
 #include "geoflow/tools/simulator/body_trajectory.hpp"
 #include "geoflow/tools/simulator/knob.hpp"
 #include "geoflow/tools/simulator/walk_options.hpp"
+#include "tests/support/go2_check_values.hpp"
 
+#include "src/stance_motion.hpp"
 #include "walk_fixture.hpp"
 
 namespace geoflow::simulator {
@@ -150,6 +152,16 @@ TEST(Walk, ARollingFootsContactPointRestsAndGivesTheBodysVelocity) {
   RecordProperty("worst_still_foot_mps", std::to_string(worst_still_foot));
   EXPECT_LT(worst, 1e-9);
   EXPECT_GT(worst_still_foot, 0.03);  // the rolling is there to be found: 22 mm times 1.5 rad/s
+}
+
+TEST(Walk, AFootIsPutWhereUnitreesModelHasItForTheSameJoints) {
+  for (const geoflow::tests::CheckValue& check : geoflow::tests::go2_check_values()) {
+    const Vector3d centre = foot_contact(kGo2Legs, check.leg, check.q, Vector3d::UnitZ(), 0).point;
+    const auto joints = joint_angles_of_centre(kGo2Legs, check.leg, centre);
+    ASSERT_TRUE(joints.has_value());
+    EXPECT_LT((*joints - check.q).norm(), 1e-9);
+    EXPECT_LT((foot_position(kGo2Legs, check.leg, *joints) - check.foot).norm(), 1e-8);
+  }
 }
 
 TEST(Walk, JointRatesAreTheDerivativesOfTheAngles) {

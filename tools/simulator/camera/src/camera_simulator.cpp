@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include <malloc.h>
 #include <tbb/parallel_invoke.h>
 #include <tl/expected.hpp>
 
@@ -190,6 +192,15 @@ CameraIntrinsics scaled(const CameraIntrinsics& vga, int width, int height) {
 
 std::span<const Knob<CameraOptions>> camera_knobs() {
   return kKnobs;
+}
+
+void keep_freed_memory() noexcept {
+  constexpr int kLargestAllowed = 32 * 1024 * 1024;  // DEFAULT_MMAP_THRESHOLD_MAX of glibc
+  constexpr int kNever = std::numeric_limits<int>::max();
+  // NOLINTBEGIN(concurrency-mt-unsafe): said where it is declared
+  mallopt(M_MMAP_THRESHOLD, kLargestAllowed);
+  mallopt(M_TRIM_THRESHOLD, kNever);
+  // NOLINTEND(concurrency-mt-unsafe)
 }
 
 SE3 d435i_T_cam_ir() {

@@ -1,5 +1,6 @@
 #include "src/color_view.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include "geoflow/tools/simulator/texture.hpp"
 
 #include "src/candidates.hpp"
+#include "src/glints.hpp"
 #include "src/ray_scene.hpp"
 #include "src/sender.hpp"
 #include "src/shader.hpp"
@@ -40,8 +42,9 @@ void end_rays(const Subject& subject, const Tile& tile, const Candidates& may, R
 }
 
 /// Writes share * sum to the tile's pixels in an image of that width.
-void put(const Tile& tile, const LaneColours& sum, float share, std::size_t width,
-         std::vector<Rgb>& image) {
+template <typename Value>
+void put(const Tile& tile, const std::array<Value, kPacket>& sum, float share, std::size_t width,
+         std::vector<Value>& image) {
   for (std::size_t i = 0; i < kPacket; ++i) {
     if (tile.valid[i] != 0) {
       image[static_cast<std::size_t>(tile.y(i)) * width + static_cast<std::size_t>(tile.x(i))] =
@@ -68,6 +71,7 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
   const float share = 1.0F / static_cast<float>(sampling.rays_a_pixel);
   const auto width = static_cast<std::size_t>(intrinsics.width);
   std::vector<Rgb> image(width * static_cast<std::size_t>(intrinsics.height));
+  Glints glints{intrinsics.width, intrinsics.height};
   for_each_tile_row(intrinsics.width, intrinsics.height, [&](int top) {
     return [&, legs = sender.legs(top)](const Tile& tile) {
       const Candidates& may = steady ? steady->candidates(tile) : anything;
@@ -88,12 +92,16 @@ std::vector<Rgb> expose(const Subject& subject, const CameraIntrinsics& intrinsi
         end_rays(subject, tile, may, packet);
         subject.shader.shade(tile.valid, packet, look, mirrored, sum);
       }
-      subject.shader.add_mirrored(
-          {.footprint_per_t = pinhole.inverse_fx, .rays_a_pixel = sampling.rays_a_pixel}, mirrored,
-          sum);
+      subject.shader.see_mirrored(
+          {.footprint_per_t = pinhole.inverse_fx, .rays_a_pixel = sampling.rays_a_pixel}, mirrored);
       put(tile, sum, share, width, image);
+      if (mirrored.seen) {
+        put(tile, mirrored.light, share, width, glints.light);
+        put(tile, mirrored.rough, share, width, glints.rough);
+      }
     };
   });
+  add_glints(glints, static_cast<float>(intrinsics.fy), image);
   return image;
 }
 

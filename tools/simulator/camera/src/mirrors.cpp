@@ -84,12 +84,12 @@ Shader::Gloss Shader::gloss_of(const Valid& valid, const Material& material, con
 }
 
 void Shader::mirror(const Gloss& gloss, const RayPacket& packet, const Look& look,
-                    Mirrored& mirrored, LaneColours& light, LaneColours& sum) const {
+                    Mirrored& mirrored, LaneColours& light) const {
   Bounce bounce;
   with_wide_vectors([&]() __attribute__((always_inline)) {
     // How many of a pixel's rays see a mirror image goes by the share that it makes of its light.
     constexpr float kFewest = 0.25F;
-    constexpr float kEager = 2.0F;
+    constexpr float kEager = 0.5F;
     // Copies: GCC makes no vectors of what it loads through a constant reference in here.
     const Gloss on = gloss;
     const RTCRay16 ray = packet.ray;
@@ -133,19 +133,20 @@ void Shader::mirror(const Gloss& gloss, const RayPacket& packet, const Look& loo
       continue;
     }
     if (mirrored.count == kPacket) {
-      add_mirrored(look, mirrored, sum);
+      see_mirrored(look, mirrored);
     }
     const std::size_t to = mirrored.count++;
     mirrored.lane[to] = i;
     mirrored.weight[to] = bounce.weight[i];
     mirrored.brightest_nit[to] = bounce.brightest_nit[i];
+    mirrored.roughness[to] = gloss.roughness[i];
     aim(mirrored.packet, to, {bounce.origin_x[i], bounce.origin_y[i], bounce.origin_z[i]},
         {bounce.direction_x[i], bounce.direction_y[i], bounce.direction_z[i]});
     mirrored.packet.ray.time[to] = packet.ray.time[i];
   }
 }
 
-void Shader::add_mirrored(const Look& look, Mirrored& mirrored, LaneColours& sum) const {
+void Shader::see_mirrored(const Look& look, Mirrored& mirrored) const {
   if (mirrored.count == 0) {
     return;
   }
@@ -169,9 +170,14 @@ void Shader::add_mirrored(const Look& look, Mirrored& mirrored, LaneColours& sum
   }
   for (std::size_t i = 0; i < mirrored.count; ++i) {
     const float most = mirrored.brightest_nit[i] / std::max(luminance(lights[i]), kFaintest_nit);
-    sum[mirrored.lane[i]] += lights[i] * (std::min(1.0F, most) * mirrored.weight[i]);
+    const float weight = mirrored.weight[i];
+    Rgb light = lights[i] * (std::min(1.0F, most) * weight);
+    light[3] = weight;
+    mirrored.light[mirrored.lane[i]] += light;
+    mirrored.rough[mirrored.lane[i]] += weight * mirrored.roughness[i];
   }
   mirrored.count = 0;
+  mirrored.seen = true;
 }
 
 }  // namespace geoflow::simulator

@@ -35,16 +35,22 @@ constexpr std::size_t kRings = 2 * kCapRings;
 constexpr std::size_t kFacets = (kRings - 1) * kSides;
 constexpr std::size_t kCorners = kRings * kSides;
 
-void write_capsule(const Capsule& capsule, float* out) {
-  constexpr float kSteep = 0.9F;
+Vector3f axis_of(const Capsule& capsule) {
   constexpr float kShortest_m = 1e-6F;
-  constexpr float kPi = std::numbers::pi_v<float>;
   const Vector3f along = capsule.end - capsule.start;
-  const Vector3f axis =
-      along.norm() > kShortest_m ? Vector3f{along.normalized()} : Vector3f{Vector3f::UnitZ()};
-  const Vector3f side = (std::abs(axis.z()) < kSteep ? Vector3f::UnitZ() : Vector3f::UnitX())
-                            .cross(axis)
-                            .normalized();
+  return along.norm() > kShortest_m ? Vector3f{along.normalized()} : Vector3f{Vector3f::UnitZ()};
+}
+
+/// A direction far from the capsule's, from which its rings' corners are counted.
+Vector3f away_from(const Capsule& capsule) {
+  constexpr float kSteep = 0.9F;
+  return std::abs(axis_of(capsule).z()) < kSteep ? Vector3f::UnitZ() : Vector3f::UnitX();
+}
+
+void write_capsule(const Capsule& capsule, const Vector3f& away, float* out) {
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const Vector3f axis = axis_of(capsule);
+  const Vector3f side = away.cross(axis).normalized();
   const Vector3f other = axis.cross(side);
   for (std::size_t ring = 0; ring < kRings; ++ring) {
     const bool first = ring < kCapRings;
@@ -178,7 +184,7 @@ void RayScene::add_capsules() {
   const Owned<RTCGeometry> geometry{rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD)};
   float* vertices = new_corners(geometry.get(), 0, kCorners * capsules.size());
   for (std::size_t i = 0; i < capsules.size(); ++i) {
-    write_capsule(capsules[i], vertices + 3 * kCorners * i);
+    write_capsule(capsules[i], away_from(capsules[i]), vertices + 3 * kCorners * i);
   }
   set_facets(geometry.get(), capsules.size());
   attach(standing_.get(), geometry.get(), HitKind::kCapsule);
@@ -190,7 +196,9 @@ void RayScene::add_people() {
     return;
   }
   walking_.reset(rtcNewScene(device_.get()));
-  rtcSetSceneFlags(walking_.get(), RTC_SCENE_FLAG_DYNAMIC);
+  rtcSetSceneFlags(walking_.get(),
+                   static_cast<RTCSceneFlags>(static_cast<unsigned>(RTC_SCENE_FLAG_DYNAMIC) |
+                                              static_cast<unsigned>(RTC_SCENE_FLAG_ROBUST)));
   people_.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD));
   rtcSetGeometryTimeStepCount(people_.get(), 2);
   people_begin_.resize(count);
@@ -224,8 +232,10 @@ void RayScene::move_people(double begin_s, double end_s) {
     people_boxes_.push_back({.low_m = {box.min().x(), box.min().y(), box.min().z()},
                              .high_m = {box.max().x(), box.max().y(), box.max().z()}});
     for (std::size_t i = 0; i < begin.size(); ++i, ++next) {
-      write_capsule(begin[i], people_vertices_[0] + 3 * kCorners * next);
-      write_capsule(end[i], people_vertices_[1] + 3 * kCorners * next);
+      // Corners of both are counted alike: else a limb between the two would be wrung out thin.
+      const Vector3f away = away_from(begin[i]);
+      write_capsule(begin[i], away, people_vertices_[0] + 3 * kCorners * next);
+      write_capsule(end[i], away, people_vertices_[1] + 3 * kCorners * next);
       people_begin_[next] = begin[i];
       people_travel_m_ = std::max({people_travel_m_, (end[i].start - begin[i].start).norm(),
                                    (end[i].end - begin[i].end).norm()});

@@ -326,7 +326,7 @@ void Shader::shade_patch(unsigned index, const Valid& valid, const RayPacket& pa
   light_of_patch(index, hits, look, irradiance, light);
   if (material.reflectivity > 0) {
     mirror(gloss_of(valid, material, hits.facing * patch.normal(), hits, irradiance), packet, look,
-           mirrored, light, sum);
+           mirrored, light);
   }
   for (std::size_t i = 0; i < kPacket; ++i) {
     sum[i] += light[i];
@@ -349,7 +349,7 @@ void Shader::shade(const Valid& valid, const RayPacket& packet, const Look& look
     }
   }
   if (mirrors) {
-    mirror(gloss_of(valid, seen), packet, look, mirrored, light, sum);
+    mirror(gloss_of(valid, seen), packet, look, mirrored, light);
   }
   for (std::size_t i = 0; i < kPacket; ++i) {
     sum[i] += light[i];

@@ -51,20 +51,25 @@ class Shader {
     /// image is seen by the first ones alone, which count for the others.
     std::array<int, kPacket> order{};
   };
-  /// Mirrored rays, of some of a tile's packets, whose light is still to be added.
+  /// Mirrored rays of some of a tile's packets.
   struct Mirrored {    // NOLINT(cppcoreguidelines-pro-type-member-init)
     RayPacket packet;  ///< set as far as `count`
     std::size_t count = 0;
     std::array<std::size_t, kPacket> lane{};  ///< of the ray that was mirrored
     Lanes weight{};                           ///< of its light
     Lanes brightest_nit{};                    ///< it counts for at most
+    Lanes roughness{};                        ///< of the mirror
+    bool seen = false;                        ///< any of the tile's
+    /// Of those that have been seen: luminance times weight [cd/m^2], the fourth number
+    /// the weight itself; and roughness times weight.
+    LaneColours light{};
+    Lanes rough{};
   };
   /// Adds the luminance [cd/m^2] seen by each valid lane of a traced packet to `sum`, but for
-  /// mirror images: those of rays that are left in `mirrored` are added by add_mirrored() or a
-  /// later call with the same `sum`.
+  /// mirror images, which come to be in `mirrored`: what is left of them by see_mirrored().
   void shade(const Valid& valid, const RayPacket& packet, const Look& look, Mirrored& mirrored,
              LaneColours& sum) const;
-  void add_mirrored(const Look& look, Mirrored& mirrored, LaneColours& sum) const;
+  void see_mirrored(const Look& look, Mirrored& mirrored) const;
 
   /// The surfaces that the valid lanes hit.
   [[nodiscard]] Surfaces surfaces(const Valid& valid, const RayPacket& packet,
@@ -124,7 +129,7 @@ class Shader {
                                       const LaneColours& irradiance);
   /// Takes the mirrors' shares out of `light`, and leaves their rays in `mirrored`.
   void mirror(const Gloss& gloss, const RayPacket& packet, const Look& look, Mirrored& mirrored,
-              LaneColours& light, LaneColours& sum) const;
+              LaneColours& light) const;
   /// The patch that all valid lanes hit; kNoPatch: none, or several.
   [[nodiscard]] static unsigned only_patch(const Valid& valid, const RayPacket& packet);
   /// Luminance [cd/m^2] without mirrors of lanes that hit one patch; `irradiance` on it [lux].
