@@ -34,6 +34,7 @@ target_compile_options(geoflow_options INTERFACE
   -fno-math-errno -fstack-protector-strong
   $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond;-Wlogical-op>
   $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
+target_link_options(geoflow_options INTERFACE $<$<CXX_COMPILER_ID:Clang>:-fuse-ld=lld>)
 # fmt 9 and GCC 12's optimiser disagree about null and array bounds inside inlined library code.
 target_compile_options(geoflow_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference>)
 target_compile_definitions(geoflow_options INTERFACE
@@ -46,9 +47,9 @@ if(GEOFLOW_SANITIZE)
 else()
   target_compile_definitions(geoflow_options INTERFACE $<$<NOT:$<CONFIG:Debug>>:_FORTIFY_SOURCE=2>)
 endif()
-if(GEOFLOW_FUZZ)
-  target_compile_options(geoflow_options INTERFACE -fsanitize=fuzzer-no-link)
-endif()
+
+# What libFuzzer learns from: the parts' own code, not that of programs and tests around it.
+set(geoflow_coverage $<$<BOOL:${GEOFLOW_FUZZ}>:-fsanitize=fuzzer-no-link>)
 
 # What nearly every source includes; precompiled once per part. Sources still include all that they use: clang-tidy refuses
 # one that does not.
@@ -66,6 +67,7 @@ function(geoflow_part name)
   target_sources(geoflow_${name} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${headers})
   target_include_directories(geoflow_${name} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
   target_link_libraries(geoflow_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS} geoflow_options)
+  target_compile_options(geoflow_${name} PRIVATE ${geoflow_coverage})
   target_precompile_headers(geoflow_${name} PRIVATE ${geoflow_precompiled} ${ARG_PRECOMPILE})
   add_library(geoflow::${name} ALIAS geoflow_${name})
 endfunction()
@@ -107,6 +109,7 @@ function(geoflow_fuzz name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_OF" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} geoflow_options)
+  target_compile_options(${name} PRIVATE ${geoflow_coverage})
   foreach(part IN LISTS ARG_PRIVATE_OF)
     target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/${part}")
   endforeach()

@@ -33,6 +33,10 @@ constexpr std::string_view kSyncName = "SYNC";
 constexpr std::string_view kShippedName = "config/go2_legs.dbc";
 constexpr std::size_t kJointCount = kLegCount * kJointsPerLeg;
 constexpr std::uint8_t kMostCounterBits = 32;
+// After how long the time of SYNC may begin again [s]: several rounds, and what a Duration can
+// hold.
+constexpr double kShortestTimePeriodS = 0.01;
+constexpr double kLongestTimePeriodS = 1e9;
 
 /// A kind of joint value: how names end, and in which unit.
 struct JointQuantity {
@@ -194,8 +198,15 @@ Result<void> LegDictionary::add_sync(const dbc::Message& message) {
                   "bits without offset",
                   name_, time->line, time->name);
     }
+    const double period_s = std::ldexp(time->factor, time->field.bits);
+    if (period_s < kShortestTimePeriodS || period_s > kLongestTimePeriodS) {
+      return fail(ErrorCode::kInvalidData,
+                  "{}:{}: signal {} of message SYNC begins again every {} s; it must be {} to {} s",
+                  name_, time->line, time->name, period_s, kShortestTimePeriodS,
+                  kLongestTimePeriodS);
+    }
     sync.time = *time;
-    sync.period = from_seconds(std::ldexp(time->factor, time->field.bits));
+    sync.period = from_seconds(period_s);
   }
   sync_ = std::move(sync);
   return {};

@@ -57,7 +57,7 @@ struct SyncMessage {
   std::size_t length = 0;
   dbc::Signal sequence;
   std::optional<dbc::Signal> time{};
-  Duration period{};  ///< after which `time` begins again from 0; zero without `time`
+  Duration period{};  ///< after which `time` begins again from 0, 10 ms to 1e9 s; zero without it
 };
 
 /// What a frame is to the dictionary.

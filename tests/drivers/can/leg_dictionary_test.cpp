@@ -140,6 +140,10 @@ TEST(LegDictionary, WhatLegsCannotBeReadFromIsAnErrorWithItsLine) {
               HasSubstr("message SYNC has no signal seq"));
   EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(10,0) [0|0] \"us\"")),
               HasSubstr("time_10us of message SYNC must be an unsigned time in s"));
+  EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(7e14,0) [0|0] \"s\"")),
+              HasSubstr("time_10us of message SYNC begins again every 1.174405"));
+  EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(1e-20,0) [0|0] \"s\"")),
+              HasSubstr("must be 0.01 to 1000000000 s"));
   EXPECT_THAT(error_of(changed("SG_ FR_hip_q :", "SG_ FR_hip_q m1 :")),
               HasSubstr("where there is a multiplexor (M)"));
 }
