@@ -49,6 +49,10 @@ constexpr int kLostFrames = 15;
 constexpr double kNearM = 4;
 constexpr std::size_t kCloudsAtOnce = 8;
 
+/// A map begins with a frame whose depth fills at least this share of the image: what shows less,
+/// as a covered lens does, would hold no frame after it.
+constexpr double kLeastDepth = 0.05;
+
 }  // namespace
 
 class Core::Impl {
@@ -67,18 +71,20 @@ class Core::Impl {
 
   PoseEstimate process(const SyncedPacket& packet) {
     extend_map();
-    const ImageShape& shape = packet.color.shape();
-    if (shape.width != calibration_.camera.width || shape.height != calibration_.camera.height) {
-      return predicted_only(packet);
-    }
     const std::optional<ReckonedMotion> motion = reckoner_.add(packet);
-    tracker_.begin_frame(packet);
-    if (frames_.empty()) {
-      return start(packet);
-    }
     since_keyframe_ =
         motion && since_keyframe_ ? std::optional{*since_keyframe_ * *motion} : std::nullopt;
-    return follow(packet, motion);
+    if (frames_.empty()) {
+      motion_.update(packet.t, T_base_cam_, Matrix6d::Zero(), true);
+    }
+    const bool shows = fits_camera(packet.color);
+    if (shows) {
+      tracker_.begin_frame(packet);
+    }
+    if (!begun_ && shows && shows_depth(tracker_.current())) {
+      return start(packet, motion);
+    }
+    return begun_ && shows ? follow(packet, motion) : carry(packet, motion);
   }
 
   void extend_map() {
@@ -162,16 +168,57 @@ class Core::Impl {
     T_odom_cam_ = T_odom1_odom0 * T_odom_cam_;
   }
 
-  PoseEstimate start(const SyncedPacket& packet) {
-    Frame& frame = tracker_.current();
-    frame.T_odom_cam = T_base_cam_;  // frames: odom is the base frame of the first packet
-    motion_.update(packet.t, frame.T_odom_cam, Matrix6d::Zero(), true);
-    insert_keyframe(Matrix6d::Zero());
+  [[nodiscard]] bool fits_camera(const FrameRef& image) const {
+    return image && image.shape().width == calibration_.camera.width &&
+           image.shape().height == calibration_.camera.height;
+  }
+
+  [[nodiscard]] static bool shows_depth(const Frame& frame) {
+    return frame.cloud && static_cast<double>(frame.cloud->size()) >
+                              kLeastDepth * static_cast<double>(frame.cloud->grid().size());
+  }
+
+  /// Begins the map: where legs have carried the robot from the first packet on, or, if they have
+  /// not, at the origin.
+  PoseEstimate start(const SyncedPacket& packet, const std::optional<ReckonedMotion>& motion) {
+    const PosePrior prior = motion_.predict(packet.t, motion);
+    const SE3 T_odom_cam = carried_ ? prior.T_odom_cam : T_base_cam_;
+    const Matrix6d covariance = carried_ ? inverse(prior.information) : Matrix6d::Zero();
+    tracker_.current().T_odom_cam = T_odom_cam;
+    motion_.update(packet.t, T_odom_cam, covariance, true);
+    insert_keyframe(covariance);
+    begun_ = true;
     frames_.add(packet.t, reference_, SE3{});
-    PoseEstimate estimate = estimate_at(packet, frame.T_odom_cam);
+    PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.status = fixed_status();
     estimate.source = PoseSource::kNone;
-    last_ = estimate;
+    estimate.covariance = of_base(covariance);
+    return estimate;
+  }
+
+  /// Of a packet that cannot be looked at, or shows nothing yet that a map could begin with: legs
+  /// and IMU carry the pose on.
+  PoseEstimate carry(const SyncedPacket& packet, const std::optional<ReckonedMotion>& motion) {
+    const PosePrior prior = motion_.predict(packet.t, motion);
+    const SE3 T_odom_cam = prior.T_odom_cam;
+    carried_ = carried_ || (motion && motion->legs);
+    drift_ = inverse(prior.information);
+    T_odom_cam_ = T_odom_cam;
+    motion_.update(packet.t, T_odom_cam, drift_, motion.has_value());
+    PoseEstimate estimate = estimate_at(packet, T_odom_cam);
+    estimate.source = source_of(motion);
+    estimate.quality = 0;
+    if (begun_) {
+      ++frames_lost_;
+      frames_.add(packet.t, reference_,
+                  map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam);
+      estimate.covariance = of_base(covariance_in_odom(T_odom_cam));
+    } else {
+      frames_.add(packet.t, std::nullopt, T_odom_cam);
+      estimate.covariance = of_base(drift_);
+    }
+    estimate.status =
+        begun_ || carried_ ? TrackingStatus::kDegraded : TrackingStatus::kInitialising;
     return estimate;
   }
 
@@ -192,15 +239,15 @@ class Core::Impl {
       frames_lost_ = 0;
       tracker_.current().anchored = true;
     }
-    motion_.update(packet.t, T_odom_cam, result.covariance, result.sure || fixed || motion);
+    drift(T_odom_cam, result);
+    motion_.update(packet.t, T_odom_cam, drift_, result.sure || fixed || motion);
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.source = result.source;
     estimate.visual_inliers = result.solution.visual_inliers;
     estimate.depth_inliers = result.solution.depth_inliers;
-    const Matrix6d covariance = covariance_in_odom(T_odom_cam, result);
-    const Matrix6d A = T_base_cam_.adjoint();
-    estimate.covariance = A * covariance * A.transpose();
+    const Matrix6d covariance = covariance_in_odom(T_odom_cam);
+    estimate.covariance = of_base(covariance);
     estimate.status =
         fixed && result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
     estimate.quality = result.quality();
@@ -211,23 +258,6 @@ class Core::Impl {
     }
     estimate.reset_counter = reset_counter_;
     frames_.add(packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam);
-    last_ = estimate;
-    return estimate;
-  }
-
-  /// What can be said of a packet that cannot be looked at.
-  PoseEstimate predicted_only(const SyncedPacket& packet) {
-    PoseEstimate estimate = last_;
-    estimate.t = packet.t;
-    estimate.sequence = packet.sequence;
-    estimate.source = PoseSource::kConstantVelocity;
-    estimate.quality = 0;
-    if (frames_.empty()) {
-      estimate.status = TrackingStatus::kInitialising;
-      return estimate;
-    }
-    place(estimate, motion_.predict(packet.t).T_odom_cam);
-    estimate.status = TrackingStatus::kDegraded;
     return estimate;
   }
 
@@ -257,20 +287,30 @@ class Core::Impl {
     return estimate;
   }
 
-  /// Covariance of T_odom_cam: that of the reference keyframe, carried to this frame, plus that of
-  /// what ties the frame to it: one registration, or, since the thread was lost, all steps in turn.
-  Matrix6d covariance_in_odom(const SE3& T_odom_cam, const TrackingResult& result) {
-    const Keyframe& reference = map_.keyframe(reference_);
-    const Matrix6d A = (T_odom_cam.inverse() * reference.T_odom_cam).adjoint();
-    if (result.anchored) {
-      drift_.setZero();
+  /// A frame's error in respect of the reference keyframe: that of one registration, or, since the
+  /// thread was lost, of all steps in turn. A prediction tells of all of them by itself.
+  void drift(const SE3& T_odom_cam, const TrackingResult& result) {
+    if (result.anchored || !result.sure) {
+      drift_ = result.covariance;
     } else {
       const Matrix6d by_step = (T_odom_cam.inverse() * T_odom_cam_).adjoint();
-      drift_ = by_step * drift_ * by_step.transpose();
+      drift_ = by_step * drift_ * by_step.transpose() + result.covariance;
     }
-    drift_ += result.covariance;
     T_odom_cam_ = T_odom_cam;
+  }
+
+  /// Covariance of T_odom_cam: that of the reference keyframe, carried to this frame, and the
+  /// drift() since.
+  [[nodiscard]] Matrix6d covariance_in_odom(const SE3& T_odom_cam) const {
+    const Keyframe& reference = map_.keyframe(reference_);
+    const Matrix6d A = (T_odom_cam.inverse() * reference.T_odom_cam).adjoint();
     return A * reference.covariance * A.transpose() + drift_;
+  }
+
+  /// Of the base, the covariance of a pose of the camera.
+  [[nodiscard]] Matrix6d of_base(const Matrix6d& covariance) const {
+    const Matrix6d A = T_base_cam_.adjoint();
+    return A * covariance * A.transpose();
   }
 
   [[nodiscard]] std::optional<PosePrior> since_keyframe() const {
@@ -351,7 +391,8 @@ class Core::Impl {
   bool loop_found_ = false;  ///< the map is to be corrected
   SE3 T_map_odom_;           ///< what closed loops have moved the map by
   FollowedFrames frames_;
-  PoseEstimate last_;
+  bool begun_ = false;                 ///< there is a keyframe
+  bool carried_ = false;               ///< before it, legs have told of a way
   SE3 T_odom_cam_;                     ///< of the last frame
   Matrix6d drift_ = Matrix6d::Zero();  ///< of the last frame in respect of the map
   int frames_lost_ = 0;

@@ -11,7 +11,8 @@ Trajectory FollowedFrames::trajectory(const Map& map, const SE3& T_base_cam) con
   Trajectory trajectory;
   const SE3 T_cam_base = T_base_cam.inverse();
   for (const FollowedFrame& frame : frames_) {
-    const SE3& T_odom_reference = map.keyframe(frame.reference).T_odom_cam;
+    const SE3 T_odom_reference =
+        frame.reference ? map.keyframe(*frame.reference).T_odom_cam : SE3{};
     trajectory.push_back({frame.t, T_odom_reference * frame.T_reference_cam * T_cam_base});
   }
   return trajectory;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "geoflow/hal/geometry.hpp"
@@ -13,11 +14,11 @@ namespace geoflow::slam {
 class Map;
 
 /// Every frame's pose relative to a keyframe, so that it follows when the keyframe is moved by
-/// later optimisation.
+/// later optimisation; without a reference, of a frame before there was any, in odom.
 class FollowedFrames {
  public:
   [[nodiscard]] bool empty() const noexcept { return frames_.empty(); }
-  void add(HostTime t, KeyframeId reference, const SE3& T_reference_cam) {
+  void add(HostTime t, std::optional<KeyframeId> reference, const SE3& T_reference_cam) {
     frames_.push_back({t, reference, T_reference_cam});
   }
   /// The newest frame has become this keyframe.
@@ -31,7 +32,7 @@ class FollowedFrames {
  private:
   struct FollowedFrame {
     HostTime t;
-    KeyframeId reference;
+    std::optional<KeyframeId> reference;
     SE3 T_reference_cam;
   };
   std::vector<FollowedFrame> frames_;

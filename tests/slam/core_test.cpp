@@ -71,5 +71,30 @@ TEST(Core, ThePoseDoesNotWaitForItsKeyframeNorDependOnWhenThatIsMade) {
   EXPECT_TRUE(late->take_mapping_task().has_value());
 }
 
+TEST(Core, BegunWithoutDepthItFollowsTheMapFromTheFirstDepthOn) {
+  Calibration calibration;
+  calibration.camera = wall_camera();
+  const auto core = Core::create(calibration, {}).value();
+  std::vector<SyncedPacket> packets = walk_along_a_wall();
+  constexpr std::size_t kWithoutDepth = 3;
+  for (SyncedPacket& packet : std::span{packets}.first(kWithoutDepth)) {
+    packet.depth = FrameRef{};
+  }
+  std::vector<PoseEstimate> estimates;
+  for (const SyncedPacket& packet : packets) {
+    estimates.push_back(core->process(packet));
+  }
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    EXPECT_EQ(estimates[i].status,
+              i < kWithoutDepth ? TrackingStatus::kInitialising : TrackingStatus::kTracking)
+        << i;
+  }
+  EXPECT_EQ(core->final_trajectory().size(), packets.size());
+  const double seen = static_cast<double>(packets.size() - kWithoutDepth - 1);
+  const SE3 T_first_last =  // frames: base0 <- base1
+      estimates[kWithoutDepth].T_odom_base.inverse() * estimates.back().T_odom_base;
+  EXPECT_NEAR(T_first_last.translation().norm(), kStepM * seen, 0.05 * kStepM * seen);
+}
+
 }  // namespace
 }  // namespace geoflow::slam

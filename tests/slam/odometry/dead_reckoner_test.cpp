@@ -22,22 +22,6 @@
 namespace geoflow::slam {
 namespace {
 
-/// The samples of a walk by packet: those in (previous, t] and the next one behind.
-template <typename Sample>
-std::vector<Timed<Sample>> window(const std::vector<Timed<Sample>>& all, HostTime after,
-                                  HostTime until) {
-  std::vector<Timed<Sample>> in;
-  for (const auto& sample : all) {
-    if (sample.t > after) {
-      in.push_back(sample);
-      if (sample.t >= until) {
-        break;
-      }
-    }
-  }
-  return in;
-}
-
 /// One simulated walk, and what a reckoner makes of it.
 class Walked : public SimulatedWalk {
  public:
@@ -54,14 +38,14 @@ class Walked : public SimulatedWalk {
   [[nodiscard]] Account reckon(const Switches& switches, bool with_legs, bool with_twist) const {
     DeadReckoner reckoner{switches, calibration};
     Account account;
-    HostTime before = walk_time(0);
     for (double t_s = kFrameS; t_s < kWalkS - kFrameS; t_s += kFrameS) {
-      SyncedPacket packet;
-      packet.t = walk_time(t_s);
-      packet.imu = window(imu, before, packet.t);
-      packet.legs = with_legs ? window(legs, before, packet.t) : std::vector<Timed<LegSample>>{};
-      packet.body_velocity = with_twist ? window(body_velocity, before, packet.t)
-                                        : std::vector<Timed<BodyVelocitySample>>{};
+      SyncedPacket packet = samples_until(t_s);
+      if (!with_legs) {
+        packet.legs.clear();
+      }
+      if (!with_twist) {
+        packet.body_velocity.clear();
+      }
       const auto motion = reckoner.add(packet);
       if (motion) {
         const SE3 truth = T_world_cam(t_s - kFrameS).inverse() * T_world_cam(t_s);
@@ -78,7 +62,6 @@ class Walked : public SimulatedWalk {
             3;
         account.worst_m = std::max(account.worst_m, translation.norm());
       }
-      before = packet.t;
     }
     account.nees_rotation /= std::max(1, account.motions);
     account.nees_translation /= std::max(1, account.motions);

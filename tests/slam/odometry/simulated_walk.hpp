@@ -1,13 +1,16 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/samples.hpp"
+#include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/tools/simulator/imu_simulator.hpp"
 #include "geoflow/tools/simulator/leg_simulator.hpp"
@@ -61,12 +64,33 @@ class SimulatedWalk {
     return walk_.state(t_s).body.v_world_base;
   }
 
+  /// The packet of the frame at t_s, without images: the samples since the frame before, and of
+  /// each kind the next one behind.
+  [[nodiscard]] SyncedPacket samples_until(double t_s) const {
+    const HostTime after = walk_time(t_s - kFrameS);
+    SyncedPacket packet;
+    packet.t = walk_time(t_s);
+    packet.imu = window(imu, after, packet.t);
+    packet.legs = window(legs, after, packet.t);
+    packet.body_velocity = window(body_velocity, after, packet.t);
+    return packet;
+  }
+
   Calibration calibration;
   std::vector<Timed<ImuSample>> imu;
   std::vector<Timed<LegSample>> legs;
   std::vector<Timed<BodyVelocitySample>> body_velocity;
 
  private:
+  template <typename Sample>
+  static std::vector<Timed<Sample>> window(const std::vector<Timed<Sample>>& all, HostTime after,
+                                           HostTime until) {
+    const auto t = &Timed<Sample>::t;
+    const auto begin = std::ranges::upper_bound(all, after, {}, t);
+    const auto end = std::ranges::lower_bound(begin, all.end(), until, {}, t);
+    return {begin, end == all.end() ? end : std::next(end)};
+  }
+
   simulator::Walk walk_;
 };
 

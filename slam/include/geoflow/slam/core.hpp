@@ -49,8 +49,9 @@ class Core {
   ~Core();
 
   /// Tracks one packet. Never fails: what could not be estimated is said by the estimate's status.
-  /// A packet whose image has another size than the calibration's is answered by the prediction
-  /// alone, with status kDegraded.
+  /// A packet without an image, or with one of another size than the calibration's, is answered by
+  /// what legs and IMU say, with status kDegraded. So are those before the first frame with depth,
+  /// at which the map begins; with status kInitialising until legs have told of a way.
   [[nodiscard]] PoseEstimate process(const SyncedPacket& packet);
 
   /// Makes the last frame a keyframe if it is to be one: apart from process(), so that its pose
