@@ -30,6 +30,7 @@
 #include "map/map.hpp"
 #include "map/map_builder.hpp"
 #include "map/map_correction.hpp"
+#include "map/mapping_problem.hpp"
 #include "odometry/dead_reckoner.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/pose_optimiser.hpp"
@@ -98,7 +99,8 @@ class Core::Impl {
     extend_map();
     if (std::exchange(loop_found_, false)) {
       return MappingTask{.problem = nullptr,
-                         .graph = std::make_shared<const PoseGraphProblem>(pose_graph(map_))};
+                         .graph = std::make_shared<const PoseGraphProblem>(pose_graph(map_)),
+                         .revision = revision_};
     }
     if (!pending_) {
       return std::nullopt;
@@ -109,12 +111,24 @@ class Core::Impl {
     if (config_.switches.loop_closing) {
       task.loops = loop_closer_.problem(map_, newest);
     }
+    task.revision = revision_;
+    return task;
+  }
+
+  std::optional<MappingTask> take_global_task() {
+    extend_map();
+    if (!std::exchange(global_due_, false)) {
+      return std::nullopt;
+    }
+    MappingTask task = builder_.whole_map_task(map_);
+    task.revision = revision_;
     return task;
   }
 
   void apply(const MappingResult& result) {
+    const bool current = result.revision == revision_;
     if (result.solution) {
-      move(builder_.apply(map_, *result.solution));
+      take_over(*result.solution, current);
     }
     if (result.loops) {
       for (const RelativeEdge& loop : loop_closer_.consider(map_, *result.loops)) {
@@ -126,10 +140,12 @@ class Core::Impl {
         }
       }
     }
-    if (result.graph) {
-      // The map moves, and the robot in it; where it is in odom stays as it is.
+    if (result.graph && !current) {
+      loop_found_ = true;
+    } else if (result.graph) {
       if (const std::optional<SE3> T_map1_map0 = correct(map_, *result.graph)) {
         move_in_map(*T_map1_map0);
+        global_due_ = true;
       }
     }
   }
@@ -147,6 +163,21 @@ class Core::Impl {
   }
 
  private:
+  /// What was solved before the whole map moved is where the map was then. What was measured is
+  /// good all the same.
+  void take_over(const MappingSolution& solution, bool current) {
+    if (!current) {
+      global_due_ = global_due_ || solution.whole_map;
+      for (const RelativeEdge& edge : solution.measured) {
+        map_.add_edge(edge);
+      }
+    } else if (solution.whole_map) {
+      move_in_map(builder_.apply(map_, solution));
+    } else {
+      move(builder_.apply(map_, solution));
+    }
+  }
+
   /// Ties the part of a new keyframe to the one in which it has found its place.
   void join(const RelativeEdge& tie) {
     const bool here = map_.keyframe(tie.to).part == map_.newest_part();
@@ -154,11 +185,14 @@ class Core::Impl {
     if (here) {
       move_in_map(T_map1_map0);
     }
+    global_due_ = true;
   }
 
+  /// The map has moved, and the robot in it; where it is in odom stays as it is.
   void move_in_map(const SE3& T_map1_map0) {
     move(T_map1_map0);
     T_map_odom_ = T_map1_map0 * T_map_odom_;
+    ++revision_;
   }
 
   /// Moves what depends on the newest keyframes.
@@ -387,9 +421,11 @@ class Core::Impl {
   std::optional<Matrix6d> keyframe_due_;  ///< covariance of the last frame, which is to become one
   std::optional<KeyframeId> pending_;
   std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
-  bool part_due_ = false;    ///< the last frame, which is to become a keyframe, begins one
-  bool loop_found_ = false;  ///< the map is to be corrected
-  SE3 T_map_odom_;           ///< what closed loops have moved the map by
+  bool part_due_ = false;       ///< the last frame, which is to become a keyframe, begins one
+  bool loop_found_ = false;     ///< the map is to be corrected
+  bool global_due_ = false;     ///< it has been: all of it is to be adjusted
+  std::uint32_t revision_ = 0;  ///< how often all of the map has moved
+  SE3 T_map_odom_;              ///< what closed loops have moved the map by
   FollowedFrames frames_;
   bool begun_ = false;                 ///< there is a keyframe
   bool carried_ = false;               ///< before it, legs have told of a way
@@ -421,6 +457,9 @@ void Core::extend_map() {
 }
 std::optional<MappingTask> Core::take_mapping_task() {
   return impl_->take_mapping_task();
+}
+std::optional<MappingTask> Core::take_global_task() {
+  return impl_->take_global_task();
 }
 void Core::apply(const MappingResult& result) {
   impl_->apply(result);

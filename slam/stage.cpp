@@ -20,6 +20,8 @@ const char* to_string(Stage stage) noexcept {
       return "keyframe";
     case Stage::kMapping:
       return "mapping";
+    case Stage::kGlobalMapping:
+      return "global_mapping";
   }
   return "?";
 }

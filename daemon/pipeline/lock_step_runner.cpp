@@ -110,6 +110,9 @@ PoseEstimate LockStepRunner::estimate(const SyncedPacket& packet) {
     run_.core->apply(slam::optimise(*task, &run_.statistics->mapping));
     counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
   }
+  if (const auto task = run_.core->take_global_task()) {
+    run_.core->apply(slam::optimise(*task, &run_.statistics->global_mapping));
+  }
   return estimate;
 }
 

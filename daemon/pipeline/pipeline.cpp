@@ -23,17 +23,15 @@
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
-#include "geoflow/hal/thread.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/core.hpp"
-#include "geoflow/slam/mapping.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 #include "geoflow/timesync/latest.hpp"
 #include "geoflow/timesync/packet_queue.hpp"
-#include "geoflow/timesync/spsc_ring.hpp"
 #include "geoflow/timesync/synchroniser.hpp"
 
 #include "pipeline/estimation.hpp"
+#include "pipeline/map_worker.hpp"
 #include "pipeline/propagation.hpp"
 #include "pipeline/pulse.hpp"
 #include "pipeline/sample_queues.hpp"
@@ -43,29 +41,33 @@ namespace {
 
 using timesync::Doorbell;
 
-/// The signs of life of the three threads that wait.
+/// The signs of life of the threads that wait, but for those of the map's workers.
 struct Pulses {
   Pulse sync;
   Pulse slam;
-  Pulse map;
 };
 
-/// Their doorbells.
+/// The doorbells of all.
 struct Bells {
   Doorbell sync;
   Doorbell slam;
   Doorbell map;
+  Doorbell global_map;
 
   static Result<Bells> create() {
     auto sync = Doorbell::create();
     auto slam = Doorbell::create();
     auto map = Doorbell::create();
-    for (const auto* bell : {&sync, &slam, &map}) {
+    auto global_map = Doorbell::create();
+    for (const auto* bell : {&sync, &slam, &map, &global_map}) {
       if (!*bell) {
         return tl::unexpected{bell->error()};
       }
     }
-    return Bells{.sync = std::move(*sync), .slam = std::move(*slam), .map = std::move(*map)};
+    return Bells{.sync = std::move(*sync),
+                 .slam = std::move(*slam),
+                 .map = std::move(*map),
+                 .global_map = std::move(*global_map)};
   }
 };
 
@@ -84,6 +86,9 @@ class Pipeline::Implementation {
         propagation_{run.propagator.get(), measured(std::move(handlers.on_propagated))},
         packets_{static_cast<std::size_t>(config.pipeline.packet_queue),
                  config.synchroniser.sample_capacity},
+        map_{"map", std::move(bells_.map), bells_.slam, run.statistics->mapping},
+        global_map_{"global map", std::move(bells_.global_map), bells_.slam,
+                    run.statistics->global_mapping},
         ports_{run.ports()} {}
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
@@ -93,7 +98,8 @@ class Pipeline::Implementation {
     auto started = ports_.start(queues_);
     if (started) {
       // From the end of the chain, so that each thread finds the next one there.
-      map_ = launch("map", &Implementation::map, &bells_.map);
+      global_map_.start();
+      map_.start();
       slam_ = launch("slam", &Implementation::slam, &bells_.slam);
       sync_ = launch("sync", &Implementation::synchronise, &bells_.sync);
       replay_ = launch("replay", &Implementation::replay, nullptr);
@@ -102,14 +108,16 @@ class Pipeline::Implementation {
   }
 
   void stop() {
-    for (std::jthread* thread : {&replay_, &sync_, &slam_, &map_}) {
+    for (std::jthread* thread : {&replay_, &sync_, &slam_}) {
       thread->request_stop();
     }
-    for (std::jthread* thread : {&replay_, &sync_, &slam_, &map_}) {
+    for (std::jthread* thread : {&replay_, &sync_, &slam_}) {
       if (thread->joinable()) {
         thread->join();
       }
     }
+    map_.stop();
+    global_map_.stop();
     ports_.stop();
     run_.synchroniser = synchroniser_.counters();
   }
@@ -119,10 +127,8 @@ class Pipeline::Implementation {
   [[nodiscard]] std::vector<ThreadActivity> threads() const {
     ThreadActivity source = run_.activity();
     source.idle = source.idle || source_done_.load(std::memory_order_acquire);
-    ThreadActivity map = pulses_.map.activity("map", bells_.map);
-    map.long_work = true;
     return {source, pulses_.sync.activity("sync", bells_.sync),
-            pulses_.slam.activity("slam", bells_.slam), map};
+            pulses_.slam.activity("slam", bells_.slam), map_.activity(), global_map_.activity()};
   }
 
  private:
@@ -206,7 +212,8 @@ class Pipeline::Implementation {
     while (!done && !stopped) {
       done = packets_done_.load(std::memory_order_acquire);
       if (between_frames_ && between_frames_()) {
-        result_is_stale_ = mapping_;
+        map_.forget();
+        global_map_.forget();
       }
       if (const auto packet = packets_.try_pop()) {
         done = false;
@@ -231,46 +238,34 @@ class Pipeline::Implementation {
     frames_.store(estimate);
     run_.statistics->delivery.add(HostClock::now() - packet.t_arrival);
     run_.core->extend_map();
-    if (!mapping_) {
+    if (!map_.busy()) {
       if (auto task = run_.core->take_mapping_task()) {
-        mapping_ = tasks_.try_push(std::move(*task));
-        bells_.map.ring();
+        map_.give(std::move(*task));
+      }
+    }
+    if (!global_map_.busy()) {
+      if (auto task = run_.core->take_global_task()) {
+        global_map_.give(std::move(*task));
       }
     }
   }
 
   void take_over_mapping() {
-    if (const auto result = results_.try_pop()) {
-      if (!std::exchange(result_is_stale_, false)) {
-        run_.core->apply(*result);
-        run_.statistics->counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
-      }
-      mapping_ = false;
+    if (const auto result = map_.take()) {
+      run_.core->apply(*result);
+      run_.statistics->counters.mapping_runs.fetch_add(1, std::memory_order_relaxed);
+    }
+    if (const auto result = global_map_.take()) {
+      run_.core->apply(*result);
     }
   }
 
   /// At the source's end: what is still worked on goes into the final trajectory.
   void finish_mapping() {
     take_over_mapping();
-    while (mapping_ && pulses_.slam.wait(bells_.slam) != Doorbell::Wake::kStopped) {
+    while ((map_.busy() || global_map_.busy()) &&
+           pulses_.slam.wait(bells_.slam) != Doorbell::Wake::kStopped) {
       take_over_mapping();
-    }
-  }
-
-  /// At low priority: a frame must not wait for the map.
-  void map(const std::stop_token& stop) {
-    give_way();
-    bool stopped = false;
-    while (!stopped) {
-      if (const auto task = tasks_.try_pop()) {
-        // One task is out at a time, so there is room for its result.
-        (void)results_.try_push(slam::optimise(*task, &run_.statistics->mapping));
-        bells_.slam.ring();
-        pulses_.map.turn();
-        stopped = stop.stop_requested();
-      } else {
-        stopped = pulses_.map.wait(bells_.map) == Doorbell::Wake::kStopped;
-      }
     }
   }
 
@@ -281,18 +276,15 @@ class Pipeline::Implementation {
   Bells bells_;
   Pulses pulses_;
   SampleQueues queues_;
-  timesync::Synchroniser synchroniser_;                 // sync
-  Propagation propagation_;                             // sync
-  timesync::Latest<PoseEstimate> frames_;               // slam -> sync
-  timesync::PacketQueue packets_;                       // sync -> slam
-  timesync::SpscRing<slam::MappingTask> tasks_{1};      // slam -> map
-  timesync::SpscRing<slam::MappingResult> results_{1};  // map -> slam
+  timesync::Synchroniser synchroniser_;    // sync
+  Propagation propagation_;                // sync
+  timesync::Latest<PoseEstimate> frames_;  // slam -> sync
+  timesync::PacketQueue packets_;          // sync -> slam
   std::atomic<bool> source_done_{false};
   std::atomic<bool> packets_done_{false};
-  bool mapping_ = false;          // slam: a task is with map
-  bool result_is_stale_ = false;  // slam: it is a former estimator's
+  MapWorker map_;         // works for slam
+  MapWorker global_map_;  // likewise, for seconds at a time
   StartedPorts ports_;
-  std::jthread map_;
   std::jthread slam_;
   std::jthread sync_;
   std::jthread replay_;

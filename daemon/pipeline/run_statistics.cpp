@@ -43,8 +43,9 @@ std::vector<std::pair<std::string, const TimeHistogram*>> histograms(
       {"imu_to_pose", &statistics.propagation}};
   for (std::size_t i = 0; i < slam::kStageCount; ++i) {
     const auto stage = static_cast<slam::Stage>(i);
-    const StageTimer& timer =
-        stage == slam::Stage::kMapping ? statistics.mapping : statistics.tracking;
+    const StageTimer& timer = stage == slam::Stage::kMapping         ? statistics.mapping
+                              : stage == slam::Stage::kGlobalMapping ? statistics.global_mapping
+                                                                     : statistics.tracking;
     named.emplace_back(to_string(stage), &timer.histogram(stage));
   }
   return named;

@@ -58,6 +58,34 @@ std::optional<Vector3d> intersect(const Vector3d& origin_a, const Vector3d& ray_
   return 0.5 * (origin_a + depth.x() * ray_a + origin_b + depth.y() * ray_b);
 }
 
+/// Copies these keyframes, the points that at least two of them observe, and the edges between them
+/// into a problem. At least one keyframe is held, the oldest if no other.
+void copy_into(MappingProblem& problem, const Map& map, const std::set<KeyframeId>& moving,
+               const std::set<KeyframeId>& held, const std::set<PointId>& points) {
+  const auto inside = [&](KeyframeId id) { return moving.contains(id) || held.contains(id); };
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (inside(id)) {
+      problem.keyframes.push_back({id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud});
+    }
+  }
+  if (held.empty()) {
+    problem.keyframes.front().fixed = true;
+  }
+  for (const PointId id : points) {
+    const MapPoint& point = *map.find_point(id);
+    MappingPoint snapshot{.id = id, .p_odom = point.p_odom, .observations = {}};
+    std::ranges::copy_if(point.observations, std::back_inserter(snapshot.observations),
+                         [&](const Observation& o) { return inside(o.keyframe); });
+    if (snapshot.observations.size() > 1) {
+      problem.points.push_back(std::move(snapshot));
+    }
+  }
+  for (const auto* edges : {&map.edges(), &map.joins()}) {
+    std::ranges::copy_if(*edges, std::back_inserter(problem.edges),
+                         [&](const RelativeEdge& e) { return inside(e.from) && inside(e.to); });
+  }
+}
+
 /// All that legs and IMU say of the motion from one keyframe to a later one.
 std::optional<RelativeEdge> reckoned_between(const Map& map, KeyframeId from, KeyframeId to) {
   KeyframeId reached = to;
@@ -261,12 +289,17 @@ std::set<KeyframeId> MapBuilder::held_keyframes(const Map& map, const std::set<K
   return held;
 }
 
-MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
+std::shared_ptr<MappingProblem> MapBuilder::empty_problem() const {
   auto problem = std::make_shared<MappingProblem>();
   problem->camera = camera_.intrinsics();
   problem->pose = config_.pose;
   problem->mapping = config_.mapping;
   problem->gicp = gicp_;
+  return problem;
+}
+
+MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
+  auto problem = empty_problem();
   problem->edges_to_measure = edges_to_measure(map, newest);
 
   std::set<KeyframeId> moving;
@@ -282,27 +315,25 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
     points.insert(it->second.points.begin(), it->second.points.end());
   }
   const std::set<KeyframeId> held = held_keyframes(map, moving, points, *problem);
-  const auto inside = [&](KeyframeId id) { return moving.contains(id) || held.contains(id); };
+  copy_into(*problem, map, moving, held, points);
+  std::erase_if(problem->edges_to_measure, [&](const auto& pair) {
+    return !moving.contains(pair.from) && !held.contains(pair.from);
+  });
+  return {.problem = problem};
+}
+
+MappingTask MapBuilder::whole_map_task(const Map& map) const {
+  auto problem = empty_problem();
+  problem->whole_map = true;
+  std::set<KeyframeId> moving;
+  std::set<PointId> points;
   for (const auto& [id, keyframe] : map.keyframes()) {
-    if (inside(id)) {
-      problem->keyframes.push_back({id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud});
+    if (keyframe.part == map.newest_part()) {
+      moving.insert(id);
+      points.insert(keyframe.points.begin(), keyframe.points.end());
     }
   }
-  if (held.empty()) {
-    problem->keyframes.front().fixed = true;
-  }
-  for (const PointId id : points) {
-    const MapPoint& point = *map.find_point(id);
-    MappingPoint snapshot{.id = id, .p_odom = point.p_odom, .observations = {}};
-    std::ranges::copy_if(point.observations, std::back_inserter(snapshot.observations),
-                         [&](const Observation& o) { return inside(o.keyframe); });
-    if (snapshot.observations.size() > 1) {
-      problem->points.push_back(std::move(snapshot));
-    }
-  }
-  std::copy_if(map.edges().begin(), map.edges().end(), std::back_inserter(problem->edges),
-               [&](const RelativeEdge& e) { return inside(e.from) && inside(e.to); });
-  std::erase_if(problem->edges_to_measure, [&](const auto& pair) { return !inside(pair.from); });
+  copy_into(*problem, map, moving, {}, points);
   return {.problem = problem};
 }
 

@@ -33,12 +33,17 @@ class MapBuilder {
   /// surfaces are held.
   [[nodiscard]] MappingTask task(const Map& map, KeyframeId newest) const;
 
+  /// The adjustment of all keyframes of the newest part, and what they observe (global bundle
+  /// adjustment): the oldest is held.
+  [[nodiscard]] MappingTask whole_map_task(const Map& map) const;
+
   /// Takes a solution over into the map. Keyframes younger than the solution's newest move along
   /// with it. Returns the motion of that newest keyframe: T_odom1_odom0, to be applied on the left
   /// to whatever depends on it.
   [[nodiscard]] SE3 apply(Map& map, const MappingSolution& solution) const;
 
  private:
+  [[nodiscard]] std::shared_ptr<MappingProblem> empty_problem() const;
   /// Pairs of keyframes whose depth is to be registered: the newest with those that see what it
   /// sees.
   [[nodiscard]] std::vector<EdgeToMeasure> edges_to_measure(const Map& map,

@@ -15,8 +15,8 @@
 #include "cloud/gicp.hpp"
 #include "map/map.hpp"
 
-/// What goes into and comes out of one local bundle adjustment: plain snapshots, so that it can run
-/// in any thread.
+/// What goes into and comes out of one bundle adjustment, local or of the whole map: plain
+/// snapshots, so that it can run in any thread.
 namespace geoflow::slam {
 
 struct MappingKeyframe {
@@ -49,6 +49,7 @@ struct MappingProblem {
   PoseConfig pose;
   MappingConfig mapping;
   GicpConfig gicp;
+  bool whole_map = false;  ///< all keyframes of the part but the oldest move
 };
 
 struct MappingSolution {
@@ -56,6 +57,7 @@ struct MappingSolution {
   std::map<PointId, Vector3d> p_odom;                    ///< of the points that moved
   std::vector<std::pair<PointId, KeyframeId>> outliers;  ///< observations that contradict the rest
   std::vector<RelativeEdge> measured;                    ///< registrations that succeeded
+  bool whole_map = false;                                ///< as in the problem
 };
 
 }  // namespace geoflow::slam

@@ -42,7 +42,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraphProblem& problem) {
   ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem ceres{ownership};
 
-  std::vector<PoseBlock> poses;  // in one piece: see LocalBundleAdjustment
+  std::vector<PoseBlock> poses;  // in one piece: see BundleAdjustment
   std::map<KeyframeId, std::size_t> index;
   poses.reserve(problem.nodes.size());
   for (const PoseGraphNode& node : problem.nodes) {

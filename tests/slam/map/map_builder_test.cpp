@@ -12,6 +12,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/slam/config.hpp"
+#include "geoflow/slam/mapping.hpp"
 
 #include "map/ids.hpp"
 #include "map/map.hpp"
@@ -54,7 +55,8 @@ class MapBuilderTest : public testing::Test {
     return frame;
   }
 
-  TexturedWall wall_{2.0, 11};
+  static constexpr double kWallM = 2.0;
+  TexturedWall wall_{kWallM, 11};
   CameraModel camera_{wall_camera()};
   MapBuilder builder_{
       {}, {}, {.camera = wall_camera(), .source = "the test", .serial = {}}, nullptr};
@@ -136,6 +138,40 @@ TEST_F(MapBuilderTest, TheAdjustmentHoldsWhatTheWindowIsReckonedFrom) {
   const KeyframeId from = map_.keyframe(oldest_moving->id).reckoned->from;
   EXPECT_TRUE(std::ranges::any_of(problem->keyframes,
                                   [&](const auto& k) { return k.fixed && k.id == from; }));
+}
+
+// As after a loop: what each keyframe sees of the wall is right, where the map has them is not.
+TEST_F(MapBuilderTest, TheAdjustmentOfTheWholeMapMovesAllKeyframesButTheOldest) {
+  constexpr int kKeyframes = 30;  // three times the window of a local one
+  constexpr double kStepM = 0.1;
+  constexpr double kStretched = 1.05;
+  const SE3 T_odom_start;
+  Frame frame = frame_at(T_odom_start);
+  std::vector<KeyframeId> ids{builder_.insert(map_, frame, Matrix6d::Zero())};
+  for (int i = 1; i < kKeyframes; ++i) {
+    Frame next = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{kStepM * i, 0, 0}}, &frame);
+    for (Feature& feature : next.features) {
+      feature.depth_m = kWallM;
+    }
+    next.T_odom_cam = SE3{Eigen::Quaterniond::Identity(), Vector3d{kStretched * kStepM * i, 0, 0}};
+    ids.push_back(builder_.insert(map_, next, Matrix6d::Zero()));
+    frame = next;
+  }
+  const MappingTask task = builder_.whole_map_task(map_);
+  ASSERT_EQ(task.problem->keyframes.size(), ids.size());
+  EXPECT_TRUE(task.problem->keyframes.front().fixed);
+  EXPECT_EQ(std::ranges::count_if(task.problem->keyframes, &MappingKeyframe::fixed), 1);
+
+  const MappingResult result = optimise(task);
+  ASSERT_NE(result.solution, nullptr);
+  EXPECT_TRUE(result.solution->whole_map);
+  const SE3 T_odom1_odom0 = builder_.apply(map_, *result.solution);
+  const double too_far = (kStretched - 1) * kStepM * (kKeyframes - 1);
+  EXPECT_NEAR(T_odom1_odom0.translation().x(), -too_far, 0.1 * too_far);
+  for (int i = 0; i < kKeyframes; ++i) {
+    const double x = map_.keyframe(ids[static_cast<std::size_t>(i)]).T_odom_cam.translation().x();
+    EXPECT_NEAR(x, kStepM * i, 0.1 * too_far) << i;
+  }
 }
 
 TEST_F(MapBuilderTest, PointsThatAreSeldomWhereTheyShouldBeAreForgotten) {

@@ -51,6 +51,7 @@ struct RunStatistics {
   RunCounters counters;
   StageTimer tracking;        ///< stages on the estimator's thread
   StageTimer mapping;         ///< stages of mapping, on its own thread or in lock step
+  StageTimer global_mapping;  ///< likewise, of the adjustment of the whole map
   TimeHistogram process;      ///< Core::process, all its stages and what is between them
   TimeHistogram delivery;     ///< live: from a frame's arrival to its estimate
   TimeHistogram propagation;  ///< live: from an IMU sample's arrival to its pose

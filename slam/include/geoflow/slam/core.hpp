@@ -62,8 +62,13 @@ class Core {
   /// A snapshot for one local bundle adjustment, once after each keyframe; nothing otherwise.
   [[nodiscard]] std::optional<MappingTask> take_mapping_task();
 
-  /// Takes over the result of a task of this Core. Keyframes made since the task was taken keep
-  /// their pose relative to its newest keyframe.
+  /// A snapshot for one adjustment of the whole map (global bundle adjustment), once after each
+  /// correction for loops; nothing otherwise. It may take seconds and be worked on beside tasks of
+  /// take_mapping_task(); one at a time.
+  [[nodiscard]] std::optional<MappingTask> take_global_task();
+
+  /// Takes over the result of a task of this Core, of either kind. Keyframes made since the task
+  /// was taken keep their pose relative to its newest keyframe.
   void apply(const MappingResult& result);
 
   /// How long the colour camera takes to read its rows out, as its features have shown [s].

@@ -15,8 +15,9 @@ enum class Stage : std::uint8_t {
   kFeatures,
   kKeyframe,
   kMapping,
+  kGlobalMapping,
 };
-inline constexpr std::size_t kStageCount = 8;
+inline constexpr std::size_t kStageCount = 9;
 
 [[nodiscard]] const char* to_string(Stage stage) noexcept;
 

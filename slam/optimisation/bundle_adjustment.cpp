@@ -36,13 +36,14 @@ constexpr double kCauchyWidth =
 constexpr double kHuberWidth =
     2.5;  ///< of relative edges, in standard deviations of six dimensions
 
-class LocalBundleAdjustment {
+class BundleAdjustment {
  public:
-  explicit LocalBundleAdjustment(const MappingProblem& problem)
+  explicit BundleAdjustment(const MappingProblem& problem)
       : problem_{problem}, camera_{problem.camera} {}
 
   MappingSolution solve() {
     solution_ = std::make_unique<MappingSolution>();
+    solution_->whole_map = problem_.whole_map;
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
       index_.emplace(keyframe.id, poses_.size());
       poses_.push_back(to_block(keyframe.T_odom_cam));
@@ -163,7 +164,7 @@ class LocalBundleAdjustment {
 
   void run() {
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_type = problem_.whole_map ? ceres::SPARSE_SCHUR : ceres::DENSE_SCHUR;
     options.linear_solver_ordering = ordering_;
     options.max_num_iterations = problem_.mapping.iterations;
     options.num_threads = 1;  // threads would sum in another order each time
@@ -221,11 +222,12 @@ class LocalBundleAdjustment {
 }  // namespace
 
 MappingResult optimise(const MappingTask& task, StageObserver* observer) {
-  const StageScope scope{observer, Stage::kMapping};
-  MappingResult result;
+  const bool whole_map = task.problem && task.problem->whole_map;
+  const StageScope scope{observer, whole_map ? Stage::kGlobalMapping : Stage::kMapping};
+  MappingResult result{.solution = nullptr, .revision = task.revision};
   if (task.problem) {
     result.solution =
-        std::make_shared<const MappingSolution>(LocalBundleAdjustment{*task.problem}.solve());
+        std::make_shared<const MappingSolution>(BundleAdjustment{*task.problem}.solve());
   }
   if (task.loops) {
     result.loops = std::make_shared<const LoopSolution>(verify_loops(*task.loops));
