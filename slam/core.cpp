@@ -176,6 +176,9 @@ class Core::Impl {
     } else {
       move(builder_.apply(map_, solution));
     }
+    if (current && !solution.gyro_bias.empty()) {
+      reckoner_.see_gyro_bias(solution.gyro_bias.rbegin()->second);
+    }
   }
 
   /// Ties the part of a new keyframe to the one in which it has found its place.
@@ -396,8 +399,10 @@ class Core::Impl {
         const RelativeEdge edge{.from = before,
                                 .to = reference_,
                                 .T_from_to = since_keyframe_->T_cam0_cam1,
-                                .information = inverse(since_keyframe_->covariance)};
+                                .information = inverse(since_keyframe_->covariance),
+                                .kind = EdgeKind::kReckoned};
         map_.add_edge(edge);
+        map_.keyframe(reference_).gyro = since_keyframe_->gyro;
         if (since_keyframe_->legs) {
           map_.keyframe(reference_).reckoned = edge;
         }

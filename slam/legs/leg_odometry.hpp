@@ -53,6 +53,7 @@ struct LegEstimate {
   Matrix6d covariance = Matrix6d::Zero();
   VelocityBelief velocity;
   ImuBias bias;
+  Matrix3d gyro_bias_covariance = Matrix3d::Zero();
   ContactEstimator::Feet feet{};
   StanceVelocity stance;  ///< at the newest leg sample
   bool still = false;
@@ -82,6 +83,10 @@ class LegOdometry {
   void start(const StandingFix& fix);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
+
+  /// The gyroscope's bias as images of the last seconds tell it [rad/s, imu frame]; nothing before
+  /// the start. To be told some times a second: what is told counts as one of ten that overlap.
+  void see_gyro_bias(const Vector3d& bias_radps);
 
  private:
   /// One foot's orientation in odom when it was last seen to stand, for how far it has rolled

@@ -12,6 +12,7 @@
 #include "geoflow/hal/time.hpp"
 
 #include "cloud/depth_cloud.hpp"
+#include "inertial/gyro_turn.hpp"
 #include "map/ids.hpp"
 #include "map/stored_cloud.hpp"
 #include "place/place_index.hpp"
@@ -40,8 +41,9 @@ struct MapPoint {
   std::uint32_t found = 0;                ///< of those, frames in which it agreed with the pose
 };
 
-/// Whether an edge ties neighbours on one way, or a place to itself as it was seen again.
-enum class EdgeKind : std::uint8_t { kWay, kLoop };
+/// Whether an edge ties neighbours on one way, a place to itself as it was seen again, or a
+/// keyframe to the one before by IMU and legs.
+enum class EdgeKind : std::uint8_t { kWay, kLoop, kReckoned };
 
 /// The relative pose of two keyframes: from their depth, a GICP factor (paper, equation (5)); from
 /// IMU and legs in between; or from both views, where a loop closes.
@@ -67,6 +69,7 @@ struct Keyframe {
   /// What legs and IMU say of the motion since the keyframe before; none: not all the way, or of
   /// another run.
   std::optional<RelativeEdge> reckoned{};
+  GyroTurn gyro{};              ///< in the edge of kind kReckoned to it; none of another run
   std::vector<PointId> points;  ///< that it observes
 };
 

@@ -65,7 +65,8 @@ void copy_into(MappingProblem& problem, const Map& map, const std::set<KeyframeI
   const auto inside = [&](KeyframeId id) { return moving.contains(id) || held.contains(id); };
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (inside(id)) {
-      problem.keyframes.push_back({id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud});
+      problem.keyframes.push_back(
+          {id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud, keyframe.gyro});
     }
   }
   if (held.empty()) {
@@ -113,6 +114,7 @@ MapBuilder::MapBuilder(const Config& config, const GicpConfig& gicp, const Calib
     : config_{config},
       gicp_{gicp},
       camera_{calibration.camera},
+      gyro_random_walk_{calibration.imu_noise.gyro_random_walk},
       orb_{config.features},
       observer_{observer} {}
 
@@ -295,6 +297,7 @@ std::shared_ptr<MappingProblem> MapBuilder::empty_problem() const {
   problem->pose = config_.pose;
   problem->mapping = config_.mapping;
   problem->gicp = gicp_;
+  problem->gyro_random_walk = gyro_random_walk_;
   return problem;
 }
 
@@ -348,6 +351,9 @@ SE3 MapBuilder::apply(Map& map, const MappingSolution& solution) const {
   }
   for (const auto& [id, pose] : solution.T_odom_cam) {
     map.keyframe(id).T_odom_cam = pose;
+  }
+  for (const auto& [id, bias] : solution.gyro_bias) {
+    map.keyframe(id).gyro.bias = bias;
   }
   for (const auto& [id, p_odom] : solution.p_odom) {
     if (MapPoint* point = map.find_point(id)) {

@@ -62,6 +62,7 @@ class MapBuilder {
   Config config_;
   GicpConfig gicp_;
   CameraModel camera_;
+  double gyro_random_walk_;
   OrbExtractor orb_;
   StageObserver* observer_;
 };

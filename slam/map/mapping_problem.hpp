@@ -13,6 +13,7 @@
 
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
+#include "inertial/gyro_turn.hpp"
 #include "map/map.hpp"
 
 /// What goes into and comes out of one bundle adjustment, local or of the whole map: plain
@@ -24,6 +25,7 @@ struct MappingKeyframe {
   SE3 T_odom_cam;
   bool fixed = false;
   std::shared_ptr<const DepthCloud> cloud;  ///< null: none
+  GyroTurn gyro{};                          ///< in the motion from the keyframe before
 };
 
 struct MappingPoint {
@@ -44,6 +46,7 @@ struct MappingProblem {
   std::vector<MappingKeyframe> keyframes;  ///< in order of id; at least one is fixed
   std::vector<MappingPoint> points;
   std::vector<RelativeEdge> edges;  ///< known ones between keyframes of the problem
+  double gyro_random_walk = 0;      ///< ImuNoise::gyro_random_walk
   std::vector<EdgeToMeasure> edges_to_measure;
   CameraIntrinsics camera;
   PoseConfig pose;
@@ -57,7 +60,8 @@ struct MappingSolution {
   std::map<PointId, Vector3d> p_odom;                    ///< of the points that moved
   std::vector<std::pair<PointId, KeyframeId>> outliers;  ///< observations that contradict the rest
   std::vector<RelativeEdge> measured;                    ///< registrations that succeeded
-  bool whole_map = false;                                ///< as in the problem
+  std::map<KeyframeId, Vector3d> gyro_bias;  ///< GyroTurn::bias of the keyframes that moved
+  bool whole_map = false;                    ///< as in the problem
 };
 
 }  // namespace geoflow::slam

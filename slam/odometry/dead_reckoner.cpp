@@ -37,7 +37,8 @@ ReckonedMotion operator*(const ReckonedMotion& first, const ReckonedMotion& seco
   const Matrix6d A = T_cam1_cam2.inverse().adjoint();
   return {.T_cam0_cam1 = T_cam0_cam2,  // frames: of both together, cam2 is the later one
           .covariance = A * first.covariance * A.transpose() + second.covariance,
-          .legs = first.legs && second.legs};
+          .legs = first.legs && second.legs,
+          .gyro = first.gyro.then(second.gyro, T_cam1_cam2.rotation_matrix())};
 }
 
 DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibration)
@@ -46,6 +47,7 @@ DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibrat
       gyro_density_{leg_config_of(calibration).gyro_density()},
       base_known_{calibration.T_base_cam.has_value()} {
   if (switches.imu && calibration.T_cam_imu) {
+    R_cam_imu_ = calibration.T_cam_imu->rotation_matrix();
     odometry_.emplace(leg_config_of(calibration));
   }
 }
@@ -100,7 +102,20 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
     // A velocity that nothing corrects is anything after a few steps.
     covariance.bottomRightCorner<3, 3>().diagonal().setConstant(squared(kUnknownM));
   }
-  return of_camera(T_base0_base1, doubt * covariance, last_->health.contact_s > 0);
+  ReckonedMotion motion = of_camera(T_base0_base1, doubt * covariance, last_->health.contact_s > 0);
+  const Matrix3d per_bias = -dt * R_cam_imu_;
+  motion.gyro = {.duration_s = dt,
+                 .per_bias = per_bias,
+                 .taken_out = per_bias * before->bias.gyro_radps,
+                 .bias = last_->bias.gyro_radps,
+                 .bias_covariance = last_->gyro_bias_covariance};
+  return motion;
+}
+
+void DeadReckoner::see_gyro_bias(const Vector3d& bias_radps) {
+  if (odometry_) {
+    odometry_->see_gyro_bias(bias_radps);
+  }
 }
 
 std::optional<ReckonedMotion> DeadReckoner::by_twist(const SyncedPacket& packet) const {

@@ -7,6 +7,7 @@
 #include "geoflow/hal/synced_packet.hpp"
 #include "geoflow/slam/config.hpp"
 
+#include "inertial/gyro_turn.hpp"
 #include "legs/leg_odometry.hpp"
 
 namespace geoflow::slam {
@@ -18,6 +19,7 @@ struct ReckonedMotion {
   /// Of a right perturbation of T_cam0_cam1.
   Matrix6d covariance = Matrix6d::Zero();
   bool legs = false;  ///< feet or the robot's odometry had part in it
+  GyroTurn gyro{};
 };
 
 /// One motion after the other.
@@ -34,6 +36,9 @@ class DeadReckoner {
   /// sensor, or it has not found out yet which way is up.
   std::optional<ReckonedMotion> add(const SyncedPacket& packet);
 
+  /// The gyroscope's bias as images tell it [rad/s, imu frame].
+  void see_gyro_bias(const Vector3d& bias_radps);
+
  private:
   [[nodiscard]] std::optional<ReckonedMotion> by_inertia(LegOdometry& odometry,
                                                          const SyncedPacket& packet);
@@ -46,6 +51,7 @@ class DeadReckoner {
   SE3 T_base_cam_;
   double gyro_density_;  ///< LegConfig::gyro_density()
   bool base_known_;
+  Matrix3d R_cam_imu_ = Matrix3d::Identity();
   std::optional<LegOdometry> odometry_;
   std::optional<LegEstimate> last_;
   std::optional<HostTime> t_last_;

@@ -18,6 +18,7 @@
 #include "geoflow/slam/stage.hpp"
 
 #include "cloud/gicp.hpp"
+#include "inertial/gyro_turn.hpp"
 #include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
@@ -47,6 +48,7 @@ class BundleAdjustment {
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
       index_.emplace(keyframe.id, poses_.size());
       poses_.push_back(to_block(keyframe.T_odom_cam));
+      biases_.push_back(keyframe.gyro.bias);
     }
     measure_edges();
     estimate_pixel_sigma();
@@ -158,8 +160,45 @@ class BundleAdjustment {
       add_factor<RelativePoseFactor>(&edge_loss_, {pose(edge.from).data(), pose(edge.to).data()},
                                      edge.T_from_to, edge.information);
     };
-    std::ranges::for_each(problem_.edges, add);
+    for (const RelativeEdge& edge : problem_.edges) {
+      if (edge.kind == EdgeKind::kReckoned && keyframe(edge.to).gyro.duration_s > 0) {
+        add_reckoned(edge);
+      } else {
+        add(edge);
+      }
+    }
     std::ranges::for_each(solution_->measured, add);
+  }
+
+  /// The motion to a keyframe with the gyroscope's bias on the way, which is much the same as on
+  /// the way before; the first one's is what was known then.
+  void add_reckoned(const RelativeEdge& edge) {
+    const GyroTurn& before = keyframe(edge.from).gyro;
+    const GyroTurn& gyro = keyframe(edge.to).gyro;
+    double* const bias = add_bias(edge.to);
+    add_factor<ReckonedFactor>(&edge_loss_, {pose(edge.from).data(), pose(edge.to).data(), bias},
+                               edge.T_from_to, edge.information, gyro);
+    if (before.duration_s > 0) {
+      const double apart_s = 0.5 * (before.duration_s + gyro.duration_s);
+      add_factor<BiasWalkFactor>(nullptr, {add_bias(edge.from), bias},
+                                 problem_.gyro_random_walk * std::sqrt(apart_s));
+    } else if (!keyframe(edge.to).fixed) {
+      add_factor<BiasPriorFactor>(nullptr, {bias}, gyro.bias, gyro.bias_covariance);
+    }
+  }
+
+  double* add_bias(KeyframeId id) {
+    double* const block = biases_[index_.at(id)].data();
+    if (!ceres_.HasParameterBlock(block)) {
+      ceres_.AddParameterBlock(block, 3);
+      ordering_->AddElementToGroup(block, 1);
+      if (keyframe(id).fixed) {
+        ceres_.SetParameterBlockConstant(block);
+      } else {
+        moving_biases_.push_back(id);
+      }
+    }
+    return block;
   }
 
   void run() {
@@ -180,6 +219,9 @@ class BundleAdjustment {
         solution_->T_odom_cam.emplace(keyframe.id, from_block(pose(keyframe.id).data()));
       }
     }
+    for (const KeyframeId id : moving_biases_) {
+      solution_->gyro_bias.emplace(id, biases_[index_.at(id)]);
+    }
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const MappingPoint& point = problem_.points[i];
       solution_->p_odom.emplace(point.id, points_[i]);
@@ -199,6 +241,8 @@ class BundleAdjustment {
   /// In the problem's order, in one piece: Ceres orders the blocks of a group by their addresses,
   /// and the order of a sum decides its last bits.
   std::vector<PoseBlock> poses_;
+  std::vector<Vector3d> biases_;  ///< GyroTurn::bias, likewise
+  std::vector<KeyframeId> moving_biases_;
   std::vector<Vector3d> points_;
   double sigma_px_ = 1;
   std::unique_ptr<MappingSolution> solution_;

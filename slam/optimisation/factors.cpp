@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 
 #include "geoflow/hal/geometry.hpp"
 
@@ -42,6 +44,40 @@ struct CameraPoint {
     }
   }
 };
+
+/// A symmetric root stays real and finite where a direction is open (eigenvalue zero, or a rounding
+/// below it).
+Matrix6d root(const Matrix6d& information) {
+  const SymmetricEigen eigen = symmetric_eigen(information);
+  return eigen.directions * eigen.eigenvalues.cwiseMax(0).cwiseSqrt().asDiagonal() *
+         eigen.directions.transpose();
+}
+
+/// log(Z^-1 Ta^-1 Tb) of the first two parameters, which are poses; residuals and the jacobians by
+/// these, which may be null, with the weight W.
+Vector6d relative_error(const SE3& T_b_a, const Matrix6d& W, const double* const* parameters,
+                        double* residuals, double** jacobians) {
+  const SE3 T_odom_a = from_block(parameters[0]);
+  const SE3 T_odom_b = from_block(parameters[1]);
+  const SE3 T_a_b = T_odom_a.inverse() * T_odom_b;
+  const Vector6d error = (T_b_a * T_a_b).log();
+  Eigen::Map<Vector6d>{residuals} = W * error;
+  if (jacobians == nullptr) {
+    return error;
+  }
+  const Matrix6d J = W * SE3::right_jacobian_inverse(error);
+  if (jacobians[0] != nullptr) {
+    PoseJacobian<kPoseTangentSize> by_a{jacobians[0]};
+    by_a.leftCols<kPoseTangentSize>() = -J * T_a_b.inverse().adjoint();
+    by_a.col(kPoseTangentSize).setZero();
+  }
+  if (jacobians[1] != nullptr) {
+    PoseJacobian<kPoseTangentSize> by_b{jacobians[1]};
+    by_b.leftCols<kPoseTangentSize>() = J;
+    by_b.col(kPoseTangentSize).setZero();
+  }
+  return error;
+}
 
 /// Nearer than this a point has no usable projection: the step that led there is refused.
 constexpr double kMinimumDepthM = 1e-3;
@@ -106,34 +142,53 @@ bool PointDepthFactor::Evaluate(const double* const* parameters, double* residua
 }
 
 RelativePoseFactor::RelativePoseFactor(const SE3& T_a_b, const Matrix6d& information)
-    : T_b_a_{T_a_b.inverse()} {
-  // A symmetric root stays real and finite where a direction is open (eigenvalue zero, or a
-  // rounding below it).
-  const SymmetricEigen eigen = symmetric_eigen(information);
-  W_ = eigen.directions * eigen.eigenvalues.cwiseMax(0).cwiseSqrt().asDiagonal() *
-       eigen.directions.transpose();
-}
+    : T_b_a_{T_a_b.inverse()}, W_{root(information)} {}
 
 bool RelativePoseFactor::Evaluate(const double* const* parameters, double* residuals,
                                   double** jacobians) const {
-  const SE3 T_odom_a = from_block(parameters[0]);
-  const SE3 T_odom_b = from_block(parameters[1]);
-  const SE3 T_a_b = T_odom_a.inverse() * T_odom_b;
-  const Vector6d error = (T_b_a_ * T_a_b).log();
-  Eigen::Map<Vector6d>{residuals} = W_ * error;
-  if (jacobians == nullptr) {
-    return true;
+  (void)relative_error(T_b_a_, W_, parameters, residuals, jacobians);
+  return true;
+}
+
+ReckonedFactor::ReckonedFactor(const SE3& T_a_b, const Matrix6d& information, const GyroTurn& gyro)
+    : T_a_b_{T_a_b}, W_{root(information)}, gyro_{gyro} {}
+
+bool ReckonedFactor::Evaluate(const double* const* parameters, double* residuals,
+                              double** jacobians) const {
+  const Vector3d turn = gyro_.correction(Eigen::Map<const Vector3d>{parameters[2]});
+  const SE3 T_b_unbiased{so3::exp(turn), Vector3d::Zero()};
+  const SE3 T_unbiased_a = (T_a_b_ * T_b_unbiased).inverse();  // frames: b as it is unbiased
+  const Vector6d error = relative_error(T_unbiased_a, W_, parameters, residuals, jacobians);
+  if (jacobians != nullptr && jacobians[2] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, kPoseTangentSize, 3, Eigen::RowMajor>>{jacobians[2]} =
+        -W_ * SE3::right_jacobian_inverse(-error).leftCols<3>() * so3::right_jacobian(turn) *
+        gyro_.per_bias;
   }
-  const Matrix6d J = W_ * SE3::right_jacobian_inverse(error);
-  if (jacobians[0] != nullptr) {
-    PoseJacobian<kPoseTangentSize> by_a{jacobians[0]};
-    by_a.leftCols<kPoseTangentSize>() = -J * T_a_b.inverse().adjoint();
-    by_a.col(kPoseTangentSize).setZero();
+  return true;
+}
+
+bool BiasWalkFactor::Evaluate(const double* const* parameters, double* residuals,
+                              double** jacobians) const {
+  const Eigen::Map<const Vector3d> a{parameters[0]};
+  const Eigen::Map<const Vector3d> b{parameters[1]};
+  Eigen::Map<Vector3d>{residuals} = (b - a) / sigma_radps_;
+  for (const int i : {0, 1}) {
+    if (jacobians != nullptr && jacobians[i] != nullptr) {
+      const double sign = i == 0 ? -1 : 1;
+      Eigen::Map<Matrix3d>{jacobians[i]} = sign / sigma_radps_ * Matrix3d::Identity();
+    }
   }
-  if (jacobians[1] != nullptr) {
-    PoseJacobian<kPoseTangentSize> by_b{jacobians[1]};
-    by_b.leftCols<kPoseTangentSize>() = J;
-    by_b.col(kPoseTangentSize).setZero();
+  return true;
+}
+
+BiasPriorFactor::BiasPriorFactor(const Vector3d& mean_radps, const Matrix3d& covariance)
+    : mean_radps_{mean_radps}, W_{covariance.inverse().llt().matrixU()} {}
+
+bool BiasPriorFactor::Evaluate(const double* const* parameters, double* residuals,
+                               double** jacobians) const {
+  Eigen::Map<Vector3d>{residuals} = W_ * (Eigen::Map<const Vector3d>{parameters[0]} - mean_radps_);
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{jacobians[0]} = W_;
   }
   return true;
 }

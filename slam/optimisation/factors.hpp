@@ -7,6 +7,7 @@
 
 #include "geoflow/hal/geometry.hpp"
 
+#include "inertial/gyro_turn.hpp"
 #include "vision/camera_model.hpp"
 
 /// Factors of bundle adjustment, one struct each, with analytic Jacobians.
@@ -76,6 +77,45 @@ class RelativePoseFactor final
  private:
   SE3 T_b_a_;
   Matrix6d W_;
+};
+
+/// The same of a motion that a gyroscope has told, whose bias is a third parameter: Z is turned by
+/// exp(GyroTurn::correction(bias)) on the right.
+class ReckonedFactor final
+    : public ceres::SizedCostFunction<kPoseTangentSize, kPoseSize, kPoseSize, 3> {
+ public:
+  ReckonedFactor(const SE3& T_a_b, const Matrix6d& information, const GyroTurn& gyro);
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  SE3 T_a_b_;
+  Matrix6d W_;
+  GyroTurn gyro_;
+};
+
+/// A gyroscope's bias that wanders from one time to the next: (b - a) / sigma [rad/s]; parameters:
+/// biases a, b.
+class BiasWalkFactor final : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  explicit BiasWalkFactor(double sigma_radps) : sigma_radps_{sigma_radps} {}
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  double sigma_radps_;
+};
+
+/// What is known of a bias beforehand: W (b - mean), with W^T W its information; parameter: b.
+class BiasPriorFactor final : public ceres::SizedCostFunction<3, 3> {
+ public:
+  BiasPriorFactor(const Vector3d& mean_radps, const Matrix3d& covariance);
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Vector3d mean_radps_;
+  Matrix3d W_;
 };
 
 }  // namespace geoflow::slam

@@ -277,7 +277,9 @@ std::vector<std::byte> encode(const std::vector<RelativeEdge>& edges) {
     writer.put(static_cast<std::uint32_t>(edge.to));
     writer.put(edge.T_from_to);
     writer.put(edge.information);
-    writer.put(static_cast<std::uint32_t>(edge.kind));
+    // Of an edge that was reckoned the gyroscope's share is not kept: it is as any other then.
+    const EdgeKind kind = edge.kind == EdgeKind::kReckoned ? EdgeKind::kWay : edge.kind;
+    writer.put(static_cast<std::uint32_t>(kind));
   }
   return writer.take();
 }

@@ -174,6 +174,44 @@ TEST_F(MapBuilderTest, TheAdjustmentOfTheWholeMapMovesAllKeyframesButTheOldest) 
   }
 }
 
+// A gyroscope whose bias has wandered by 0.3 degrees a second since the robot stood.
+TEST_F(MapBuilderTest, WhatIsSeenTellsTheGyroscopesBias) {
+  constexpr int kKeyframes = 8;
+  constexpr double kApartS = 0.25;
+  constexpr double kStepM = 0.1;
+  const Vector3d bias{0, 0.005, -0.002};
+  Matrix6d information = 1e6 * Matrix6d::Identity();
+  information.bottomRightCorner<3, 3>() *= 0.1;
+  Frame frame = frame_at(SE3{});
+  KeyframeId newest = builder_.insert(map_, frame, Matrix6d::Zero());
+  for (int i = 1; i < kKeyframes; ++i) {
+    const SE3 T_before_this{Eigen::Quaterniond::Identity(), Vector3d{kStepM, 0, 0}};
+    Frame next = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{kStepM * i, 0, 0}}, &frame);
+    for (Feature& feature : next.features) {
+      feature.depth_m = kWallM;
+    }
+    const KeyframeId before = newest;
+    newest = builder_.insert(map_, next, Matrix6d::Zero());
+    // What a reckoner says that knows nothing of the bias: the camera is the imu here.
+    const SE3 T_turned{so3::exp(kApartS * bias), Vector3d::Zero()};
+    map_.add_edge({.from = before,
+                   .to = newest,
+                   .T_from_to = T_before_this * T_turned,
+                   .information = information,
+                   .kind = EdgeKind::kReckoned});
+    map_.keyframe(newest).gyro = {.duration_s = kApartS,
+                                  .per_bias = -kApartS * Matrix3d::Identity(),
+                                  .bias_covariance = 1e-4 * Matrix3d::Identity()};
+    frame = next;
+  }
+  const MappingResult result = optimise(builder_.task(map_, newest));
+  ASSERT_NE(result.solution, nullptr);
+  ASSERT_EQ(result.solution->gyro_bias.size(), static_cast<std::size_t>(kKeyframes) - 1);
+  (void)builder_.apply(map_, *result.solution);
+  const Vector3d error = map_.keyframe(newest).gyro.bias - bias;
+  EXPECT_LT(error.norm(), 0.1 * bias.norm()) << error.transpose();
+}
+
 TEST_F(MapBuilderTest, PointsThatAreSeldomWhereTheyShouldBeAreForgotten) {
   Frame a = frame_at(SE3{});
   builder_.insert(map_, a, Matrix6d::Zero());

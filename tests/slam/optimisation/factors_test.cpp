@@ -11,6 +11,7 @@
 #include "geoflow/hal/geometry.hpp"
 #include "tests/support/data.hpp"
 
+#include "inertial/gyro_turn.hpp"
 #include "slam/optimisation/jacobian_check.hpp"
 #include "vision/camera_model.hpp"
 
@@ -44,7 +45,27 @@ TEST(Factors, JacobiansMatchDifferences) {
     const SE3 T_odom_b = T_odom_a * T_a_b * random_pose(random, 0.1);
     expect_jacobians(RelativePoseFactor{T_a_b, root.transpose() * root},
                      {block_of(T_odom_a), block_of(T_odom_b)});
+
+    const std::vector<double> bias{0.01, -0.02, 0.03 * trial};
+    const GyroTurn gyro{
+        .duration_s = 1, .per_bias = Matrix3d::Random(), .taken_out = 0.02 * Vector3d::Random()};
+    expect_jacobians(ReckonedFactor{T_a_b, root.transpose() * root, gyro},
+                     {block_of(T_odom_a), block_of(T_odom_b), bias});
+    expect_jacobians(BiasWalkFactor{0.003}, {bias, {0, 0.01, 0}});
+    const Matrix3d spread = Matrix3d::Random() + 3 * Matrix3d::Identity();
+    expect_jacobians(BiasPriorFactor{{0.01, 0, 0}, spread * spread.transpose()}, {bias});
   }
+}
+
+TEST(Factors, APriorOfABiasCountsItsErrorInStandardDeviations) {
+  Matrix3d covariance = Matrix3d::Zero();
+  covariance.diagonal() << 4e-6, 1e-6, 9e-6;
+  const BiasPriorFactor factor{{0.01, 0, 0}, covariance};
+  const Vector3d bias{0.012, -0.001, 0.003};
+  const std::array<const double*, 1> parameters{bias.data()};
+  Vector3d residuals;
+  ASSERT_TRUE(factor.Evaluate(parameters.data(), residuals.data(), nullptr));
+  EXPECT_NEAR(residuals.squaredNorm(), 3, 1e-9);
 }
 
 TEST(Factors, RelativePoseLeavesOpenDirectionsFree) {
