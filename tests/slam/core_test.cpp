@@ -91,9 +91,10 @@ TEST(Core, BegunWithoutDepthItFollowsTheMapFromTheFirstDepthOn) {
   }
   EXPECT_EQ(core->final_trajectory().size(), packets.size());
   const double seen = static_cast<double>(packets.size() - kWithoutDepth - 1);
-  const SE3 T_first_last =  // frames: base0 <- base1
-      estimates[kWithoutDepth].T_odom_base.inverse() * estimates.back().T_odom_base;
-  EXPECT_NEAR(T_first_last.translation().norm(), kStepM * seen, 0.05 * kStepM * seen);
+  const SE3& T_odom_base0 = estimates[kWithoutDepth].T_odom_base;
+  const SE3& T_odom_base1 = estimates.back().T_odom_base;
+  const SE3 T_base0_base1 = T_odom_base0.inverse() * T_odom_base1;
+  EXPECT_NEAR(T_base0_base1.translation().norm(), kStepM * seen, 0.05 * kStepM * seen);
 }
 
 }  // namespace

@@ -102,6 +102,8 @@ THREAD_FILES = (
     "drivers/dds/session.cpp",  # what a process has joined is one table for all its threads
     "daemon/bus/ros_bus.cpp",  # tells ROS 2 machines, where DDS may block, on a thread of its own
     "daemon/bus/ros_bus.hpp",
+    "daemon/pipeline/map_worker.cpp",  # the thread of one worker on the map
+    "daemon/pipeline/map_worker.hpp",
     "daemon/pipeline/pipeline.cpp",  # makes the live pipeline's threads
     "daemon/map/map_keeper.cpp",  # makes the thread that writes the map
     "daemon/map/map_keeper.hpp",

@@ -140,12 +140,18 @@ TEST(LegDictionary, WhatLegsCannotBeReadFromIsAnErrorWithItsLine) {
               HasSubstr("message SYNC has no signal seq"));
   EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(10,0) [0|0] \"us\"")),
               HasSubstr("time_10us of message SYNC must be an unsigned time in s"));
-  EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(7e14,0) [0|0] \"s\"")),
-              HasSubstr("time_10us of message SYNC begins again every 1.174405"));
-  EXPECT_THAT(error_of(changed("(0.00001,0) [0|167.77215] \"s\"", "(1e-20,0) [0|0] \"s\"")),
-              HasSubstr("must be 0.01 to 1000000000 s"));
   EXPECT_THAT(error_of(changed("SG_ FR_hip_q :", "SG_ FR_hip_q m1 :")),
               HasSubstr("where there is a multiplexor (M)"));
+}
+
+TEST(LegDictionary, AClockThatBeginsAgainAtOnceOrInAgesIsAnError) {
+  const auto error_with_unit_of = [](std::string_view seconds) {
+    const std::string scale = "(" + std::string{seconds} + ",0) [0|0]";
+    return error_of(changed("(0.00001,0) [0|167.77215]", scale));
+  };
+  EXPECT_THAT(error_with_unit_of("7e14"),
+              HasSubstr("time_10us of message SYNC begins again every 1.174405"));
+  EXPECT_THAT(error_with_unit_of("1e-20"), HasSubstr("must be 0.01 to 1000000000 s"));
 }
 
 TEST(LegEncoder, WhatIsWrittenIsReadBackWithinAStep) {

@@ -33,8 +33,8 @@ TEST(WithoutCamera, LegsAndImuCarryThePoseAndSayHowWell) {
       ASSERT_EQ(estimate.source, PoseSource::kLegs) << t_s << " s";
     }
     const SE3 T_base0_base = T_world_base0.inverse() * walk.T_world_base(t_s);
-    const SE3 T_odom_base = estimate.T_odom_base;
-    const Vector6d error = (T_odom_base.inverse() * T_base0_base).log();
+    const SE3& T_base0_estimated = estimate.T_odom_base;  // frames: odom is base at the start
+    const Vector6d error = (T_base0_estimated.inverse() * T_base0_base).log();
     ASSERT_LT(error.tail<3>().norm(), 0.02 + 0.01 * way_m) << t_s << " s";
     const double nees = error.dot(estimate.covariance.ldlt().solve(error)) / 6;
     ASSERT_TRUE(t_s < 2 || nees < 6) << t_s << " s: " << nees;
