@@ -205,7 +205,6 @@ class Core::Impl {
       // Legs tie what they were heard all the way between; without them nothing does.
       part_due_ = begin_anew && !(since_keyframe_ && since_keyframe_->legs);
     }
-    estimate.reset_counter = reset_counter_;
     frames_.add(packet.t, reference_, map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam);
     return estimate;
   }
@@ -228,6 +227,7 @@ class Core::Impl {
     PoseEstimate estimate;
     estimate.t = packet.t;
     estimate.sequence = packet.sequence;
+    estimate.reset_counter = reset_counter_;
     place(estimate, T_odom_cam);
     // The twist of the base in the base, by the adjoint; its translation turned into odom.
     const Vector6d twist_base = T_base_cam_.adjoint() * motion_.velocity();
