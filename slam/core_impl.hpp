@@ -153,7 +153,7 @@ class Core::Impl {
     carried_ = carried_ || (motion && motion->legs);
     drift_ = inverse(prior.information);
     T_odom_cam_ = T_odom_cam;
-    motion_.update(packet.t, T_odom_cam, drift_, motion.has_value());
+    motion_.update(packet.t, T_odom_cam, drift_, motion && motion->legs);
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.source = source_of(motion);
     estimate.quality = 0;
@@ -166,8 +166,7 @@ class Core::Impl {
       frames_.add(packet.t, std::nullopt, T_odom_cam);
       estimate.covariance = of_base(drift_);
     }
-    estimate.status =
-        begun_ || carried_ ? TrackingStatus::kDegraded : TrackingStatus::kInitialising;
+    estimate.status = begun_ || carried_ ? reckoned_status(motion) : TrackingStatus::kInitialising;
     return estimate;
   }
 
@@ -189,7 +188,7 @@ class Core::Impl {
       tracker_.current().anchored = true;
     }
     drift(T_odom_cam, result);
-    motion_.update(packet.t, T_odom_cam, drift_, result.sure || fixed || motion);
+    motion_.update(packet.t, T_odom_cam, drift_, result.sure || fixed || (motion && motion->legs));
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.source = result.source;
@@ -197,8 +196,11 @@ class Core::Impl {
     estimate.depth_inliers = result.solution.depth_inliers;
     const Matrix6d covariance = covariance_in_odom(T_odom_cam);
     estimate.covariance = of_base(covariance);
-    estimate.status =
-        fixed && result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
+    if (fixed) {
+      estimate.status = result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
+    } else {
+      estimate.status = reckoned_status(motion);
+    }
     estimate.quality = result.quality();
     if (begin_anew || (fixed && needs_keyframe(packet, result, T_odom_cam))) {
       keyframe_due_ = covariance;
@@ -221,6 +223,15 @@ class Core::Impl {
   /// in the map is still looked for.
   [[nodiscard]] TrackingStatus fixed_status() const {
     return map_.is_tied() ? TrackingStatus::kTracking : TrackingStatus::kRelocalising;
+  }
+
+  /// Of a frame that nothing seen has fixed. Legs tell a way for as long as they are heard; without
+  /// them it is soon anywhere.
+  [[nodiscard]] TrackingStatus reckoned_status(const std::optional<ReckonedMotion>& motion) const {
+    constexpr double kLostM = 1;
+    const double variance = drift_.bottomRightCorner<3, 3>().diagonal().maxCoeff();
+    return !(motion && motion->legs) && variance > kLostM * kLostM ? TrackingStatus::kLost
+                                                                   : TrackingStatus::kDegraded;
   }
 
   [[nodiscard]] PoseEstimate estimate_at(const SyncedPacket& packet, const SE3& T_odom_cam) const {

@@ -78,6 +78,7 @@ void bind_synchroniser(timesync::SynchroniserConfig& c, std::vector<Key>& keys) 
   keys.push_back({"synchroniser.share_depth", &c.share_depth});
   keys.push_back({"synchroniser.max_wait_s", &c.max_wait, 0, 10});
   keys.push_back({"synchroniser.silent_after_s", &c.silent_after, 0.001, 60});
+  keys.push_back({"synchroniser.blind_interval_s", &c.blind_interval, 0.001, 1});
   keys.push_back({"synchroniser.max_step_s", &c.max_step, 0.1, 3600});
   keys.push_back({"synchroniser.frame_capacity", &c.frame_capacity, 2, 64});
   keys.push_back({"synchroniser.sample_capacity", &c.sample_capacity, 16, 65536});

@@ -138,6 +138,7 @@ json to_json(const timesync::SynchroniserCounters& counters) {
           {"imu_clock", to_json(counters.imu_clock)},
           {"leg_clock", to_json(counters.leg_clock)},
           {"packets", counters.packets},
+          {"blind", counters.blind},
           {"depth_missing", counters.depth_missing},
           {"depth_shared", counters.depth_shared},
           {"wait_expired", counters.wait_expired}};

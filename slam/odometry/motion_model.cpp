@@ -44,7 +44,11 @@ void MotionModel::update(HostTime t, const SE3& T_odom_cam, const Matrix6d& cova
   t_ = t;
   t_followed_ = followed ? t : t_followed_;
   T_odom_cam_ = T_odom_cam;
-  covariance_ = covariance;
+  if (followed) {
+    covariance_ = covariance;
+  } else {
+    covariance_.topLeftCorner<3, 3>() = covariance.topLeftCorner<3, 3>();
+  }
 }
 
 SE3 MotionModel::motion_over(Duration duration) const {

@@ -17,9 +17,9 @@ namespace geoflow::slam {
 /// IV-B), and the prior that holds directions in which nothing is seen. Thread-compatible.
 class MotionModel {
  public:
-  /// Takes over a tracked pose. `followed`: whether it follows from the one before by something
-  /// seen; if not, the velocity fades.
-  /// `covariance`: of a right perturbation of the pose.
+  /// Takes over a tracked pose. `followed`: whether its way from the one before is known by
+  /// something seen or by legs; if not, the velocity fades, and the way is as uncertain as the time
+  /// since. `covariance`: of a right perturbation of the pose.
   void update(HostTime t, const SE3& T_odom_cam, const Matrix6d& covariance, bool followed);
 
   /// The pose expected at `t` with its information: by `motion` since the last update, in so far as
@@ -41,7 +41,8 @@ class MotionModel {
   HostTime t_;
   HostTime t_followed_;  ///< of the last update that followed
   SE3 T_odom_cam_;
-  Matrix6d covariance_ = Matrix6d::Zero();  ///< of T_odom_cam_
+  /// Of T_odom_cam_; its way only as far as the last pose that followed.
+  Matrix6d covariance_ = Matrix6d::Zero();
   Vector6d velocity_ = Vector6d::Zero();
 };
 

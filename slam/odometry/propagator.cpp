@@ -109,9 +109,8 @@ class Propagator::Impl {
   [[nodiscard]] HostTime frame_time() const noexcept { return frame_.t; }
 
   void correct(const PoseEstimate& frame) {
-    const bool has_pose = frame.status != TrackingStatus::kStarting &&
-                          frame.status != TrackingStatus::kInitialising &&
-                          frame.status != TrackingStatus::kLost;
+    const bool has_pose =
+        frame.status != TrackingStatus::kStarting && frame.status != TrackingStatus::kInitialising;
     if (has_pose) {
       waiting_ = frame;
       take_over_frame();

@@ -23,6 +23,9 @@ using tests::read_poses;
 using tests::run_process;
 using tests::simulate_walk;
 
+/// The lens is covered, or nothing comes from the camera at all.
+class BlindWalk : public ::testing::TestWithParam<const char*> {};
+
 constexpr double kCoveredS = 4;
 constexpr double kUncoveredS = 14;
 
@@ -38,13 +41,14 @@ double way_m(const Trajectory& trajectory, double from_s, double until_s) {
   return way_m;
 }
 
-TEST(CoveredLens, TenBlindSecondsOfWalkingAreBridgedByImuAndLegsAndSaid) {
+TEST_P(BlindWalk, TenSecondsAreBridgedByImuAndLegsAndSaid) {
   const tests::TemporaryDirectory directory;
   const auto bag = simulate_walk(directory.path(), "office", 3, 16);
   ASSERT_FALSE(bag.empty());
   const auto out = directory.path() / "out";
   const auto script = directory.path() / "faults.toml";
-  std::ofstream{script} << "[[fault]]\nkind = 'cover'\nstream = 'camera'\nfrom_s = " << kCoveredS
+  std::ofstream{script} << "[[fault]]\nkind = '" << GetParam()
+                        << "'\nstream = 'camera'\nfrom_s = " << kCoveredS
                         << "\nuntil_s = " << kUncoveredS << "\n";
   const auto replayed = run_process(
       {GEOFLOW_PROGRAM, "replay", bag.string(), "-o", out.string(), "--faults", script.string()},
@@ -78,6 +82,9 @@ TEST(CoveredLens, TenBlindSecondsOfWalkingAreBridgedByImuAndLegsAndSaid) {
   EXPECT_GT(blind_way_m, 3);
   EXPECT_LT(drift_m, 0.01 * blind_way_m);
 }
+
+INSTANTIATE_TEST_SUITE_P(Faults, BlindWalk, ::testing::Values("cover", "gap"),
+                         [](const auto& fault) { return std::string{fault.param}; });
 
 }  // namespace
 }  // namespace geoflow::daemon

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <optional>
 
 #include "geoflow/hal/ports.hpp"
@@ -95,9 +96,12 @@ std::optional<Timed<BodyVelocitySample>> Synchroniser::push_body_velocity(
 }
 
 std::optional<SyncedPacket> Synchroniser::pop(HostTime now) {
-  const std::optional<HostTime> due = deadline();
-  if (!due || !is_plausible_stamp_ns(now.time_since_epoch().count())) {
+  if (!is_plausible_stamp_ns(now.time_since_epoch().count())) {
     return std::nullopt;
+  }
+  const std::optional<HostTime> due = deadline();
+  if (!due) {
+    return pop_blind(now);
   }
   if (!is_complete(color_.buffer.front().timed.t, now)) {
     if (now < *due) {
@@ -178,6 +182,50 @@ bool Synchroniser::must_see_next_color(HostTime t) const {
   return 2 * (depth_.buffer[*choice.index].timed.t - t) > earliest_next;
 }
 
+std::optional<HostTime> Synchroniser::next_blind() const {
+  std::optional<HostTime> first;
+  const auto look = [&](const auto& lane) {
+    const std::size_t i = last_t_ ? lane.buffer.upper_bound(*last_t_) : 0;
+    if (i < lane.buffer.size()) {
+      const HostTime t = lane.buffer[i].timed.t;
+      first = first ? std::min(*first, t) : t;
+    }
+  };
+  look(imu_);
+  look(legs_);
+  look(body_velocity_);
+  return first && last_t_ ? std::max(*first, *last_t_ + config_.blind_interval) : first;
+}
+
+std::optional<SyncedPacket> Synchroniser::pop_blind(HostTime now) {
+  const HostTime since = listening_since_.value_or(now);
+  const std::optional<HostTime> t = next_blind();
+  if (!t || now - *t < config_.max_wait || color_.is_alive(now, since, counters_.color)) {
+    return std::nullopt;
+  }
+  return take_blind(*t, now);
+}
+
+SyncedPacket Synchroniser::take_blind(HostTime t, HostTime now) {
+  SyncedPacket packet;
+  packet.t = t;
+  packet.t_arrival = now;
+  packet.sequence = counters_.packets;
+  take_samples(packet);
+  give_up_depth_before(t);
+  color_.buffer.set_horizon(t);
+  last_t_ = t;
+  ++counters_.packets;
+  ++counters_.blind;
+  return packet;
+}
+
+void Synchroniser::take_samples(SyncedPacket& packet) {
+  packet.imu = imu_.take_window(last_t_, packet.t, counters_.imu);
+  packet.legs = legs_.take_window(last_t_, packet.t, counters_.legs);
+  packet.body_velocity = body_velocity_.take_window(last_t_, packet.t, counters_.body_velocity);
+}
+
 SyncedPacket Synchroniser::take_packet() {
   auto& front = color_.buffer.front();
   SyncedPacket packet;
@@ -187,9 +235,7 @@ SyncedPacket Synchroniser::take_packet() {
   packet.color = front.timed.sample.image;
   packet.t_arrival = front.t_arrival;
   take_depth(packet);
-  packet.imu = imu_.take_window(last_t_, packet.t, counters_.imu);
-  packet.legs = legs_.take_window(last_t_, packet.t, counters_.legs);
-  packet.body_velocity = body_velocity_.take_window(last_t_, packet.t, counters_.body_velocity);
+  take_samples(packet);
   front.used = true;
   ++counters_.color.used;
   color_.buffer.drop(1, counters_.color);
@@ -213,7 +259,11 @@ void Synchroniser::take_depth(SyncedPacket& packet) {
   } else {
     ++counters_.depth_missing;
   }
-  const HostTime out_of_reach = packet.t - config_.depth_tolerance;
+  give_up_depth_before(packet.t);
+}
+
+void Synchroniser::give_up_depth_before(HostTime t) {
+  const HostTime out_of_reach = t - config_.depth_tolerance;
   depth_.buffer.drop(depth_.buffer.upper_bound(out_of_reach), counters_.depth);
   depth_.buffer.set_horizon(out_of_reach);
 }

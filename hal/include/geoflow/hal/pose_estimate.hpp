@@ -14,7 +14,7 @@ enum class TrackingStatus : std::uint8_t {
   kDegraded,  ///< a pose, but carried by less than the sensors should give; the covariance says how
               ///< much less
   kRelocalising,  ///< the map does not match; the odometry goes on
-  kLost,
+  kLost,          ///< nothing tells the way since some time: the pose may be off by a metre or more
 };
 
 /// What gave the first guess of a frame's pose (paper, section IV-B, in its order).

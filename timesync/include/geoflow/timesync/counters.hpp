@@ -40,7 +40,8 @@ struct SynchroniserCounters {
   ClockCounters imu_clock;
   ClockCounters leg_clock;
   std::uint64_t packets = 0;
-  std::uint64_t depth_missing = 0;  ///< packets without depth
+  std::uint64_t blind = 0;          ///< packets without images, while colour was silent
+  std::uint64_t depth_missing = 0;  ///< packets with colour, without depth
   std::uint64_t depth_shared = 0;   ///< packets whose depth had been used before
   std::uint64_t wait_expired = 0;  ///< packets that went out incomplete because their wait was over
 };

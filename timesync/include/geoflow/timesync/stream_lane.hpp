@@ -45,11 +45,16 @@ class StreamLane {
     return taken ? std::optional{timed} : std::nullopt;
   }
 
+  /// Whether it has been heard of late; counts a silence when it stops being so.
+  [[nodiscard]] bool is_alive(HostTime now, HostTime listening_since, StreamCounters& counters) {
+    return liveness_.is_alive(now, listening_since, counters.silences);
+  }
+
   /// Whether nothing at or before `t` need be waited for: a sample at or after it came, or the
   /// stream is silent.
   [[nodiscard]] bool is_ready(HostTime t, HostTime now, HostTime listening_since,
                               StreamCounters& counters) {
-    const bool alive = liveness_.is_alive(now, listening_since, counters.silences);
+    const bool alive = is_alive(now, listening_since, counters);
     const std::optional<HostTime> newest = buffer.newest();
     return !alive || (newest && *newest >= t);
   }

@@ -17,6 +17,11 @@ namespace geoflow::timesync {
 /// Makes one SyncedPacket of each colour frame: the depth frame that belongs to it, and the IMU,
 /// leg and body-velocity samples since the packet before.
 ///
+/// Where colour is silent and others are heard, packets without images go on at an interval of
+/// their own, so that motion can be reckoned through any time without a camera. They wait as long
+/// as others would (SynchroniserConfig::max_wait), so that the first frame after the silence comes
+/// in time.
+///
 /// A packet is complete when on every stream that is alive a sample at or after its t has come (for
 /// depth also the next colour frame, where that could have the better claim to it). It goes out
 /// then, or when its wait is over. Packets leave in strictly increasing t, numbered without gaps.
@@ -42,7 +47,7 @@ class Synchroniser {
   [[nodiscard]] std::optional<SyncedPacket> pop(HostTime now);
 
   /// When the wait of the oldest colour frame is over: pop then at the latest. None while there is
-  /// no colour frame.
+  /// no colour frame: what goes out then goes out when a sample comes.
   [[nodiscard]] std::optional<HostTime> deadline() const;
 
   /// At the end of the streams: what is left, one packet a call; then none, and all samples left
@@ -64,6 +69,13 @@ class Synchroniser {
   [[nodiscard]] bool must_see_next_color(HostTime t) const;
   [[nodiscard]] SyncedPacket take_packet();
   void take_depth(SyncedPacket& packet);
+  /// The next instant of a packet without images: an interval after the last one, or where, later
+  /// than that, samples begin. None where there are none.
+  [[nodiscard]] std::optional<HostTime> next_blind() const;
+  [[nodiscard]] std::optional<SyncedPacket> pop_blind(HostTime now);
+  [[nodiscard]] SyncedPacket take_blind(HostTime t, HostTime now);
+  void take_samples(SyncedPacket& packet);
+  void give_up_depth_before(HostTime t);
 
   SynchroniserConfig config_;
   Duration timeshift_cam_imu_;

@@ -23,6 +23,8 @@ struct SynchroniserConfig {
   Duration max_wait = std::chrono::milliseconds{100};
   /// A stream that was not heard for so long is not waited for until it is heard again.
   Duration silent_after = std::chrono::milliseconds{500};
+  /// Where colour is silent, packets without images are so far apart.
+  Duration blind_interval = std::chrono::milliseconds{33};
   /// A stamp further ahead of its stream's newest is refused unless the next one agrees with it.
   Duration max_step = std::chrono::seconds{5};
   /// How many samples are held at most; then the oldest is given up and counted. Frames hold memory
