@@ -19,13 +19,14 @@ struct StampedVector {
 };
 
 /// Makes one IMU of an accelerometer and a gyroscope that report apart: samples at the gyroscope's
-/// stamps, the acceleration interpolated linearly between its neighbours. A gyroscope's value waits
-/// for the acceleration after it, at most kWaiting of them. Where accelerations lie more than
-/// kWidestGap apart there is no sample. Thread-bound, no allocation.
+/// stamps, the acceleration interpolated linearly between its neighbours. Each may come ahead of
+/// the other by kWaiting values, as where both are read in batches; a gyroscope's value waits for
+/// the acceleration after it. Where accelerations lie more than kWidestGap_us apart there is no
+/// sample. Thread-bound, no allocation.
 class ImuMerge {
  public:
   static constexpr std::int32_t kWidestGap_us = 100'000;
-  static constexpr std::size_t kWaiting = 32;
+  static constexpr std::size_t kWaiting = 64;
 
   void add_accel(const StampedVector& accel) noexcept;
   void add_gyro(const StampedVector& gyro) noexcept;
@@ -37,13 +38,38 @@ class ImuMerge {
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
-  void drop_first() noexcept;
+  /// The newest kWaiting values, oldest first.
+  class Ring {
+   public:
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+    [[nodiscard]] bool full() const noexcept { return size_ == kWaiting; }
+    [[nodiscard]] const StampedVector& operator[](std::size_t i) const noexcept {
+      return values_.at((first_ + i) % kWaiting);
+    }
+    [[nodiscard]] const StampedVector& back() const noexcept { return (*this)[size_ - 1]; }
+    /// There is room: it is not full.
+    void push(const StampedVector& value) noexcept {
+      values_.at((first_ + size_) % kWaiting) = value;
+      ++size_;
+    }
+    /// There is one.
+    void pop_front() noexcept {
+      first_ = (first_ + 1) % kWaiting;
+      --size_;
+    }
+    void clear() noexcept { size_ = 0; }
 
-  std::optional<StampedVector> before_;
-  std::optional<StampedVector> after_;
-  std::array<StampedVector, kWaiting> waiting_{};  // a ring
-  std::size_t first_ = 0;
-  std::size_t count_ = 0;
+   private:
+    std::array<StampedVector, kWaiting> values_{};
+    std::size_t first_ = 0;
+    std::size_t size_ = 0;
+  };
+
+  /// Between the first two accelerations; none where they are not around it, or too far apart.
+  [[nodiscard]] std::optional<Vector3d> acceleration_at(const StampedVector& gyro) const noexcept;
+
+  Ring accels_;
+  Ring gyros_;
   std::uint64_t lost_ = 0;
 };
 

@@ -126,6 +126,7 @@ class UsbTransport final : public Transport, private usb::InSink {
   LinkInfo link_;
   std::array<std::optional<Video>, kVideoStreams> videos_{};
   std::array<bool, 2> imu_on_{};
+  std::optional<ImuLayout> imu_layout_{};  ///< of the reports so far
   TransportSink* sink_ = nullptr;
 };
 
@@ -315,6 +316,13 @@ void UsbTransport::on_report(std::span<const std::byte> report, HostTime t_arriv
     sink_->on_damaged_imu(reading.error().message);
     return;
   }
+  // The layout is the firmware's, which does not change while the camera is there: read by the
+  // other one, a damaged report would be a motion.
+  if (reading->layout != imu_layout_.value_or(reading->layout)) {
+    sink_->on_damaged_imu("a report in another layout than those before it");
+    return;
+  }
+  imu_layout_ = reading->layout;
   sink_->on_imu({.reading = *reading, .device_stamped = true, .t_arrival = t_arrival});
 }
 

@@ -227,5 +227,25 @@ TEST_F(SampleMakerTest, AcrossAGapOfTheAccelerometerThereIsNoSample) {
   EXPECT_EQ(received_.imu.size(), 1U);
 }
 
+TEST_F(SampleMakerTest, NoImuSampleIsLostWhereBothSensorsAreReadInBatches) {
+  constexpr int kBatch = 20;
+  constexpr std::uint32_t kStep_us = 5'000;
+  for (std::uint32_t begin = 0; begin < 5 * kBatch; begin += kBatch) {
+    for (std::uint32_t i = begin; i < begin + kBatch; ++i) {
+      send_imu(ImuSensor::kAccelerometer, i * kStep_us, -static_cast<int>(i));
+    }
+    for (std::uint32_t i = begin; i < begin + kBatch; ++i) {
+      send_imu(ImuSensor::kGyroscope, i * kStep_us + kStep_us / 2, 0);
+    }
+  }
+  // All but the last one, whose acceleration is to come.
+  ASSERT_EQ(received_.imu.size(), 5U * kBatch - 1);
+  EXPECT_EQ(maker_.imu_unpaired(), 0U);
+  for (std::size_t i = 0; i < received_.imu.size(); ++i) {
+    const double between = static_cast<double>(i) + 0.5;
+    EXPECT_NEAR(received_.imu[i].sample.accel_mps2.y(), -between * 9.80665e-3, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace geoflow::drivers::d435i::tests

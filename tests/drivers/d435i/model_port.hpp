@@ -15,7 +15,6 @@
 
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
-#include "geoflow/tools/emulator/d435i.hpp"
 #include "geoflow/tools/emulator/usb_device.hpp"
 
 #include "usb/port.hpp"
@@ -24,7 +23,7 @@ namespace geoflow::drivers::d435i::tests {
 
 /// An emulated camera with a clock that only polling moves.
 struct PluggedModel {
-  std::unique_ptr<emulator::D435i> device;
+  std::unique_ptr<emulator::UsbDevice> device;
   HostTime now{std::chrono::seconds{100}};
 };
 
