@@ -46,9 +46,8 @@ class BundleAdjustment {
     solution_ = std::make_unique<MappingSolution>();
     solution_->whole_map = problem_.whole_map;
     for (const MappingKeyframe& keyframe : problem_.keyframes) {
-      index_.emplace(keyframe.id, poses_.size());
-      poses_.push_back(to_block(keyframe.T_odom_cam));
-      biases_.push_back(keyframe.gyro.bias);
+      index_.emplace(keyframe.id, blocks_.size());
+      blocks_.push_back({.pose = to_block(keyframe.T_odom_cam), .bias = keyframe.gyro.bias});
     }
     measure_edges();
     estimate_pixel_sigma();
@@ -64,8 +63,9 @@ class BundleAdjustment {
   [[nodiscard]] const MappingKeyframe& keyframe(KeyframeId id) const {
     return problem_.keyframes[index_.at(id)];
   }
-  PoseBlock& pose(KeyframeId id) { return poses_[index_.at(id)]; }
-  [[nodiscard]] const PoseBlock& pose(KeyframeId id) const { return poses_[index_.at(id)]; }
+  PoseBlock& pose(KeyframeId id) { return blocks_[index_.at(id)].pose; }
+  [[nodiscard]] const PoseBlock& pose(KeyframeId id) const { return blocks_[index_.at(id)].pose; }
+  Vector3d& bias(KeyframeId id) { return blocks_[index_.at(id)].bias; }
 
   void measure_edges() {
     for (const EdgeToMeasure& pair : problem_.edges_to_measure) {
@@ -188,7 +188,7 @@ class BundleAdjustment {
   }
 
   double* add_bias(KeyframeId id) {
-    double* const block = biases_[index_.at(id)].data();
+    double* const block = bias(id).data();
     if (!ceres_.HasParameterBlock(block)) {
       ceres_.AddParameterBlock(block, 3);
       ordering_->AddElementToGroup(block, 1);
@@ -220,7 +220,7 @@ class BundleAdjustment {
       }
     }
     for (const KeyframeId id : moving_biases_) {
-      solution_->gyro_bias.emplace(id, biases_[index_.at(id)]);
+      solution_->gyro_bias.emplace(id, bias(id));
     }
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const MappingPoint& point = problem_.points[i];
@@ -238,10 +238,14 @@ class BundleAdjustment {
   const MappingProblem& problem_;
   CameraModel camera_;
   std::map<KeyframeId, std::size_t> index_;
+  /// What is adjusted of a keyframe.
+  struct KeyframeBlocks {
+    PoseBlock pose{};
+    Vector3d bias;  ///< GyroTurn::bias
+  };
   /// In the problem's order, in one piece: Ceres orders the blocks of a group by their addresses,
   /// and the order of a sum decides its last bits.
-  std::vector<PoseBlock> poses_;
-  std::vector<Vector3d> biases_;  ///< GyroTurn::bias, likewise
+  std::vector<KeyframeBlocks> blocks_;
   std::vector<KeyframeId> moving_biases_;
   std::vector<Vector3d> points_;
   double sigma_px_ = 1;
