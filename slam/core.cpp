@@ -119,6 +119,7 @@ void Core::Impl::move_in_map(const SE3& T_map1_map0) {
 void Core::Impl::move(const SE3& T_odom1_odom0) {
   tracker_.current().T_odom_cam = T_odom1_odom0 * tracker_.current().T_odom_cam;
   motion_.move(T_odom1_odom0);
+  scale_.move(T_odom1_odom0);
   T_odom_cam_ = T_odom1_odom0 * T_odom_cam_;
 }
 

@@ -29,6 +29,7 @@
 #include "map/map_correction.hpp"
 #include "map/mapping_problem.hpp"
 #include "odometry/dead_reckoner.hpp"
+#include "odometry/depth_scale.hpp"
 #include "odometry/motion_model.hpp"
 #include "odometry/pose_optimiser.hpp"
 #include "odometry/tracker.hpp"
@@ -135,13 +136,14 @@ class Core::Impl {
     const Matrix6d covariance = carried_ ? inverse(prior.information) : Matrix6d::Zero();
     tracker_.current().T_odom_cam = T_odom_cam;
     motion_.update(packet.t, T_odom_cam, covariance, true);
+    scale_.follow(T_odom_cam.translation(), tracker_.current().cloud.get());
     insert_keyframe(covariance);
     begun_ = true;
     frames_.add(packet.t, reference_, SE3{});
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
     estimate.status = fixed_status();
     estimate.source = PoseSource::kNone;
-    estimate.covariance = of_base(covariance);
+    estimate.covariance = stated(covariance, T_odom_cam);
     return estimate;
   }
 
@@ -161,10 +163,10 @@ class Core::Impl {
       ++frames_lost_;
       frames_.add(packet.t, reference_,
                   map_.keyframe(reference_).T_odom_cam.inverse() * T_odom_cam);
-      estimate.covariance = of_base(covariance_in_odom(T_odom_cam));
+      estimate.covariance = stated(covariance_in_odom(T_odom_cam), T_odom_cam);
     } else {
       frames_.add(packet.t, std::nullopt, T_odom_cam);
-      estimate.covariance = of_base(drift_);
+      estimate.covariance = stated(drift_, T_odom_cam);
     }
     estimate.status = begun_ || carried_ ? reckoned_status(motion) : TrackingStatus::kInitialising;
     return estimate;
@@ -188,6 +190,7 @@ class Core::Impl {
       tracker_.current().anchored = true;
     }
     drift(T_odom_cam, result);
+    scale_.follow(T_odom_cam.translation(), tracker_.current().cloud.get());
     motion_.update(packet.t, T_odom_cam, drift_, result.sure || fixed || (motion && motion->legs));
 
     PoseEstimate estimate = estimate_at(packet, T_odom_cam);
@@ -195,7 +198,7 @@ class Core::Impl {
     estimate.visual_inliers = result.solution.visual_inliers;
     estimate.depth_inliers = result.solution.depth_inliers;
     const Matrix6d covariance = covariance_in_odom(T_odom_cam);
-    estimate.covariance = of_base(covariance);
+    estimate.covariance = stated(covariance, T_odom_cam);
     if (fixed) {
       estimate.status = result.solution.seen_whole() ? fixed_status() : TrackingStatus::kDegraded;
     } else {
@@ -267,10 +270,14 @@ class Core::Impl {
     return A * reference.covariance * A.transpose() + drift_;
   }
 
-  /// Of the base, the covariance of a pose of the camera.
-  [[nodiscard]] Matrix6d of_base(const Matrix6d& covariance) const {
+  /// Of the base, what is stated of a pose of the camera: its covariance in the map, and how far
+  /// the map may be too large or too small.
+  [[nodiscard]] Matrix6d stated(const Matrix6d& covariance, const SE3& T_odom_cam) const {
+    const Matrix3d R_cam_odom = T_odom_cam.rotation_matrix().transpose();
+    Matrix6d whole = covariance;
+    whole.bottomRightCorner<3, 3>() += R_cam_odom * scale_.covariance() * R_cam_odom.transpose();
     const Matrix6d A = T_base_cam_.adjoint();
-    return A * covariance * A.transpose();
+    return A * whole * A.transpose();
   }
 
   [[nodiscard]] std::optional<PosePrior> since_keyframe() const {
@@ -344,6 +351,7 @@ class Core::Impl {
   MapBuilder builder_;
   LoopCloser loop_closer_;
   MotionModel motion_;
+  DepthScale scale_;
   Map map_;
   KeyframeId reference_{};
   std::optional<Matrix6d> keyframe_due_;  ///< covariance of the last frame, which is to become one
