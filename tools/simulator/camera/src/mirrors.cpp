@@ -23,6 +23,9 @@ constexpr float kInversePi = std::numbers::inv_pi_v<float>;
 constexpr float kFaintestMirror = 0.004F;  // below this a reflection is not traced
 constexpr float kBrightestGlint = 1.5F;    // of white paper in the same light
 constexpr float kFaintest_nit = 1e-6F;
+/// How many of a pixel's rays see a mirror image goes by the share that it makes of its light.
+constexpr float kFewest = 0.25F;
+constexpr float kEager = 0.5F;
 
 /// Schlick's approximation over a cosine.
 [[gnu::always_inline]] inline float schlick(float reflectivity, float cosine) noexcept {
@@ -87,9 +90,6 @@ void Shader::mirror(const Gloss& gloss, const RayPacket& packet, const Look& loo
                     Mirrored& mirrored, LaneColours& light) const {
   Bounce bounce;
   with_wide_vectors([&]() __attribute__((always_inline)) {
-    // How many of a pixel's rays see a mirror image goes by the share that it makes of its light.
-    constexpr float kFewest = 0.25F;
-    constexpr float kEager = 0.5F;
     // Copies: GCC makes no vectors of what it loads through a constant reference in here.
     const Gloss on = gloss;
     const RTCRay16 ray = packet.ray;
