@@ -31,12 +31,14 @@ class TokenBucket {
   HostTime last_;
 };
 
-/// Thins a stream to `rate_hz` (0: not at all), keeping its phase; an item may be a quarter of a
-/// period early, so that jitter does not turn half the rate into a third. Thread-compatible.
+/// Thins a stream to `rate_hz` (0 or not a number: not at all; at least one item a day), keeping its
+/// phase; an item may be a quarter of a period early, so that jitter does not turn half the rate
+/// into a third. Thread-compatible.
 class RateLimit {
  public:
   explicit RateLimit(double rate_hz)
-      : period_{rate_hz > 0.0 ? from_seconds(1.0 / rate_hz) : Duration::zero()} {}
+      : period_{rate_hz > 0.0 ? from_seconds(std::min(1.0 / rate_hz, kLongestPeriodS))
+                              : Duration::zero()} {}
 
   /// Whether the item at `now` is due.
   [[nodiscard]] bool due(HostTime now) noexcept {
@@ -48,6 +50,8 @@ class RateLimit {
   }
 
  private:
+  static constexpr double kLongestPeriodS = 86'400;  ///< any client may ask for any rate
+
   Duration period_;
   HostTime next_{};
 };
