@@ -99,6 +99,14 @@ class BundleAdjustment {
     return camera_.project(p_cam) - observation.pixel;
   }
 
+  /// Whether a point is where the observing keyframe can see it. One that is not has no residual to
+  /// begin with, for want of which Ceres would adjust nothing at all; collect() takes it for an
+  /// outlier.
+  [[nodiscard]] bool in_front(const Observation& observation, const Vector3d& p_odom) const {
+    const SE3 T_cam_odom = from_block(pose(observation.keyframe).data()).inverse();
+    return (T_cam_odom * p_odom).z() >= kMinimumDepthM;
+  }
+
   /// As in single-frame optimisation: the visual noise is what the residuals say it is.
   void estimate_pixel_sigma() {
     constexpr double kMedianOfRayleigh = 1.17741;
@@ -144,6 +152,9 @@ class BundleAdjustment {
       ceres_.AddParameterBlock(block, 3);
       ordering_->AddElementToGroup(block, 0);
       for (const Observation& observation : point.observations) {
+        if (!in_front(observation, point.p_odom)) {
+          continue;
+        }
         double* pose_block = pose(observation.keyframe).data();
         add_factor<ReprojectionFactor>(&visual_loss_, {pose_block, block}, camera_,
                                        observation.pixel, sigma_px_);
@@ -228,7 +239,7 @@ class BundleAdjustment {
       for (const Observation& observation : point.observations) {
         const double chi2 =
             residual(observation, points_[i]).squaredNorm() / (sigma_px_ * sigma_px_);
-        if (!(chi2 < kChi2Of2At99Percent)) {
+        if (!in_front(observation, points_[i]) || !(chi2 < kChi2Of2At99Percent)) {
           solution_->outliers.emplace_back(point.id, observation.keyframe);
         }
       }

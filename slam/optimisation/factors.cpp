@@ -79,9 +79,6 @@ Vector6d relative_error(const SE3& T_b_a, const Matrix6d& W, const double* const
   return error;
 }
 
-/// Nearer than this a point has no usable projection: the step that led there is refused.
-constexpr double kMinimumDepthM = 1e-3;
-
 }  // namespace
 
 PoseBlock to_block(const SE3& T) noexcept {

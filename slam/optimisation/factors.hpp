@@ -36,6 +36,9 @@ class PoseManifold final : public ceres::Manifold {
   bool MinusJacobian(const double* x, double* jacobian) const override;
 };
 
+/// Nearer than this a point has no usable projection: a step that leads there is refused [m].
+constexpr double kMinimumDepthM = 1e-3;
+
 /// Reprojection of a point (paper, equation (3)): (pi(T^-1 p) - u) / sigma; parameters: pose, point
 /// (odom) [m].
 class ReprojectionFactor final : public ceres::SizedCostFunction<2, kPoseSize, 3> {

@@ -212,6 +212,34 @@ TEST_F(MapBuilderTest, WhatIsSeenTellsTheGyroscopesBias) {
   EXPECT_LT(error.norm(), 0.1 * bias.norm()) << error.transpose();
 }
 
+// Where a keyframe is corrected by much, a point that it saw may come to lie behind it.
+TEST_F(MapBuilderTest, APointBehindTheCameraDoesNotKeepTheRestFromBeingAdjusted) {
+  constexpr int kKeyframes = 4;
+  constexpr double kStepM = 0.1;
+  constexpr double kOffM = 0.03;
+  Frame frame = frame_at(SE3{});
+  KeyframeId newest = builder_.insert(map_, frame, Matrix6d::Zero());
+  for (int i = 1; i < kKeyframes; ++i) {
+    Frame next = frame_at(SE3{Eigen::Quaterniond::Identity(), Vector3d{kStepM * i, 0, 0}}, &frame);
+    for (Feature& feature : next.features) {
+      feature.depth_m = kWallM;
+    }
+    newest = builder_.insert(map_, next, Matrix6d::Zero());
+    frame = next;
+  }
+  SE3& T_odom_cam = map_.keyframe(newest).T_odom_cam;
+  T_odom_cam = T_odom_cam * SE3{Eigen::Quaterniond::Identity(), Vector3d{kOffM, 0, 0}};
+  const PointId behind = map_.keyframe(newest).points.front();
+  map_.find_point(behind)->p_odom = Vector3d{0, 0, -1};
+
+  const MappingResult result = optimise(builder_.task(map_, newest));
+  ASSERT_NE(result.solution, nullptr);
+  EXPECT_NEAR(result.solution->T_odom_cam.at(newest).translation().x(), kStepM * (kKeyframes - 1),
+              0.1 * kOffM);
+  EXPECT_TRUE(std::ranges::any_of(result.solution->outliers,
+                                  [&](const auto& o) { return o.first == behind; }));
+}
+
 TEST_F(MapBuilderTest, PointsThatAreSeldomWhereTheyShouldBeAreForgotten) {
   Frame a = frame_at(SE3{});
   builder_.insert(map_, a, Matrix6d::Zero());
