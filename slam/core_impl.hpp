@@ -308,10 +308,12 @@ class Core::Impl {
     const bool old = packet.t - reference.t > config_.keyframes.maximum_interval;
     const double share = static_cast<double>(result.solution.visual_inliers) /
                          static_cast<double>(reference.points.size() + 1);
+    // Of features many are lost whatever the view. Where depth carries on, it tells what is left of
+    // it: on a white wall each keyframe more is one more registration's error.
+    const double in_view = result.depth_fix ? result.overlap : 2 * share;
     return moved.tail<3>().norm() > config_.keyframes.translation_m ||
            moved.head<3>().norm() > config_.keyframes.rotation_rad ||
-           (new_view && share < config_.keyframes.overlap / 2) ||
-           (new_view && result.depth_fix && result.overlap < config_.keyframes.overlap) ||
+           (new_view && in_view < config_.keyframes.overlap) ||
            (old && (new_view || share < config_.keyframes.overlap));
   }
 
