@@ -31,9 +31,9 @@ class TokenBucket {
   HostTime last_;
 };
 
-/// Thins a stream to `rate_hz` (0 or not a number: not at all; at least one item a day), keeping its
-/// phase; an item may be a quarter of a period early, so that jitter does not turn half the rate
-/// into a third. Thread-compatible.
+/// Thins a stream to `rate_hz` (0 or not a number: not at all; at least one item a day), keeping
+/// its phase; an item may be a quarter of a period early, so that jitter does not turn half the
+/// rate into a third. Thread-compatible.
 class RateLimit {
  public:
   explicit RateLimit(double rate_hz)
