@@ -9,6 +9,7 @@
 
 #include <fcntl.h>
 #include <sys/epoll.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/types.h>
 #include <tl/expected.hpp>
@@ -26,6 +27,17 @@ namespace {
 
 constexpr int kAcceptsAtOnce = 16;
 constexpr int kSendBufferBytes = 8192;  // about 13 poses; the default holds 167
+
+/// Descriptors that clients are not given: the daemon's own work opens files and devices anew,
+/// those of a recording, a map to be saved, a camera that was plugged in again.
+constexpr rlim_t kReserved = 16;
+
+/// Whether a descriptor that was just given, the lowest that was free, is one of the last.
+bool is_among_the_last(int fd) {
+  rlimit limit{};
+  return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY &&
+         static_cast<rlim_t>(fd) + kReserved >= limit.rlim_cur;
+}
 
 UniqueFd open_spare() {
   return UniqueFd{::open("/dev/null", O_RDONLY | O_CLOEXEC)};
@@ -82,7 +94,9 @@ Acceptor::~Acceptor() {
 void Acceptor::accept_some() {
   for (int i = 0; i < kAcceptsAtOnce; ++i) {
     UniqueFd fd{::accept4(socket_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
-    if (fd) {
+    if (fd && is_among_the_last(fd.get())) {
+      log::warning("server", "out of file descriptors for clients: a connection was closed");
+    } else if (fd) {
       handler_(describe(std::move(fd)));
     } else if (errno == EMFILE || errno == ENFILE) {
       shed_one();

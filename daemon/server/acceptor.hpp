@@ -24,8 +24,9 @@ struct Connection {
 };
 
 /// Accepts on one listening socket: nonblocking connections with small send buffers, so that a
-/// client that does not read holds few stale records. When the process is out of descriptors,
-/// connections are closed rather than left to spin the loop. Thread-bound: the loop's.
+/// client that does not read holds few stale records. When the process has but a few descriptors
+/// left, which it needs itself, or none, connections are closed rather than left to spin the loop.
+/// Thread-bound: the loop's.
 class Acceptor {
  public:
   using Handler = std::function<void(Connection)>;
