@@ -131,7 +131,7 @@ TEST_F(GeoflowdClients, OutOfDescriptorsItServesThoseWhoAreThere) {
     inside.push_back(*std::move(client));
     return false;
   }));
-  EXPECT_LE(inside.size(), 2U);
+  EXPECT_LE(inside.size(), 4U);  // files may be open while descriptors are counted
   EXPECT_TRUE(eventually([this] {
     return daemon_->err().find("out of file descriptors") != std::string::npos;
   })) << why
