@@ -57,6 +57,7 @@ class Core::Impl {
   PoseEstimate process(const SyncedPacket& packet) {
     extend_map();
     const std::optional<ReckonedMotion> motion = reckoner_.add(packet);
+    up_ = motion ? motion->up : std::nullopt;
     since_keyframe_ =
         motion && since_keyframe_ ? std::optional{*since_keyframe_ * *motion} : std::nullopt;
     if (frames_.empty()) {
@@ -325,6 +326,7 @@ class Core::Impl {
     }
     const KeyframeId before = reference_;
     reference_ = builder_.insert(map_, tracker_.current(), covariance);
+    map_.keyframe(reference_).up = up_;
     if (map_.keyframes().size() > 1) {
       pending_ = reference_;
       if (since_keyframe_) {
@@ -359,6 +361,7 @@ class Core::Impl {
   std::optional<Matrix6d> keyframe_due_;  ///< covariance of the last frame, which is to become one
   std::optional<KeyframeId> pending_;
   std::optional<ReckonedMotion> since_keyframe_;  ///< none where some of it is not known
+  std::optional<UpDirection> up_;                 ///< in the camera's frame, at the last packet
   bool part_due_ = false;       ///< the last frame, which is to become a keyframe, begins one
   bool loop_found_ = false;     ///< the map is to be corrected
   bool global_due_ = false;     ///< it has been: all of it is to be adjusted

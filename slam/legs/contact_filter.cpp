@@ -11,6 +11,7 @@
 #include "geoflow/hal/samples.hpp"
 
 #include "inertial/nav_state.hpp"
+#include "inertial/up_direction.hpp"
 
 namespace geoflow::slam {
 namespace {
@@ -188,6 +189,20 @@ Matrix6d ContactFilter::pose_covariance() const {
   J.block<3, 3>(3, kAttitude) = -R_imu_odom * skew(state_.p_odom);
   J.block<3, 3>(3, kPosition) = R_imu_odom;
   return J * covariance_.topLeftCorner<kGyroBias, kGyroBias>() * J.transpose();
+}
+
+UpDirection ContactFilter::up() const {
+  const Matrix3d of_bias = covariance_.block<3, 3>(kAccelBias, kAccelBias);
+  const Matrix3d with_bias = covariance_.block<3, 3>(kAttitude, kAccelBias);
+  const Matrix3d attitude_per_bias = of_bias.ldlt().solve(with_bias.transpose()).transpose();
+  const Matrix3d given_bias =
+      covariance_.block<3, 3>(kAttitude, kAttitude) - attitude_per_bias * with_bias.transpose();
+  const Matrix3d R_imu_odom = state_.q_odom_imu.toRotationMatrix().transpose();
+  return {.up = R_imu_odom.col(2),
+          .variance = given_bias.topLeftCorner<2, 2>().trace() / 2,
+          .per_bias = R_imu_odom * skew(Vector3d::UnitZ()) * attitude_per_bias,
+          .bias = state_.bias_accel,
+          .bias_covariance = of_bias};
 }
 
 Matrix3d ContactFilter::velocity_covariance() const {

@@ -8,6 +8,8 @@
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/samples.hpp"
 
+#include "inertial/up_direction.hpp"
+
 namespace geoflow::slam {
 
 /// The body of a legged robot with its footholds, as the filter below estimates it.
@@ -90,6 +92,8 @@ class ContactFilter {
 
   /// Covariance of the pose T_odom_imu as hal/geometry.hpp defines it.
   [[nodiscard]] Matrix6d pose_covariance() const;
+  /// Which way is up in the imu frame.
+  [[nodiscard]] UpDirection up() const;
   /// T_begin_imu, the IMU's motion since reset().
   [[nodiscard]] SE3 way() const;
   /// Of the velocity in odom.

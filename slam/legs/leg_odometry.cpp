@@ -362,6 +362,7 @@ LegEstimate LegOdometry::estimate(HostTime t) {
   estimate.bias = {.gyro_radps = state.bias_gyro, .accel_mps2 = state.bias_accel};
   estimate.gyro_bias_covariance =
       filter_.covariance().block<3, 3>(ContactFilter::kGyroBias, ContactFilter::kGyroBias);
+  estimate.up = filter_.up();
   estimate.feet = contact_.feet();
   estimate.stance = stance_;
   estimate.still = still_;

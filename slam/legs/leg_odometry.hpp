@@ -12,6 +12,7 @@
 
 #include "inertial/initialiser.hpp"
 #include "inertial/nav_state.hpp"
+#include "inertial/up_direction.hpp"
 #include "legs/contact.hpp"
 #include "legs/contact_filter.hpp"
 #include "legs/foot_motion.hpp"
@@ -54,6 +55,7 @@ struct LegEstimate {
   VelocityBelief velocity;
   ImuBias bias;
   Matrix3d gyro_bias_covariance = Matrix3d::Zero();
+  UpDirection up;  ///< in the imu frame
   ContactEstimator::Feet feet{};
   StanceVelocity stance;  ///< at the newest leg sample
   bool still = false;

@@ -13,6 +13,7 @@
 
 #include "cloud/depth_cloud.hpp"
 #include "inertial/gyro_turn.hpp"
+#include "inertial/up_direction.hpp"
 #include "map/ids.hpp"
 #include "map/stored_cloud.hpp"
 #include "place/place_index.hpp"
@@ -69,8 +70,9 @@ struct Keyframe {
   /// What legs and IMU say of the motion since the keyframe before; none: not all the way, or of
   /// another run.
   std::optional<RelativeEdge> reckoned{};
-  GyroTurn gyro{};              ///< in the edge of kind kReckoned to it; none of another run
-  std::vector<PointId> points;  ///< that it observes
+  GyroTurn gyro{};                  ///< in the edge of kind kReckoned to it; none of another run
+  std::optional<UpDirection> up{};  ///< in the camera's frame; none of another run
+  std::vector<PointId> points;      ///< that it observes
 };
 
 /// All that a map is made of. Copies share what is heavy: a snapshot costs little.

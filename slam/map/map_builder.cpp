@@ -66,7 +66,7 @@ void copy_into(MappingProblem& problem, const Map& map, const std::set<KeyframeI
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (inside(id)) {
       problem.keyframes.push_back(
-          {id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud, keyframe.gyro});
+          {id, keyframe.T_odom_cam, held.contains(id), keyframe.cloud, keyframe.gyro, keyframe.up});
     }
   }
   if (held.empty()) {
@@ -85,6 +85,16 @@ void copy_into(MappingProblem& problem, const Map& map, const std::set<KeyframeI
     std::ranges::copy_if(*edges, std::back_inserter(problem.edges),
                          [&](const RelativeEdge& e) { return inside(e.from) && inside(e.to); });
   }
+}
+
+/// Which way is up in odom: as the oldest keyframe of a part has felt it.
+std::optional<UpDirection> up_in(const Map& map, PartId part) {
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (keyframe.part == part && keyframe.up) {
+      return keyframe.up->seen_from(keyframe.T_odom_cam.rotation_matrix());
+    }
+  }
+  return std::nullopt;
 }
 
 /// All that legs and IMU say of the motion from one keyframe to a later one.
@@ -318,6 +328,7 @@ MappingTask MapBuilder::task(const Map& map, KeyframeId newest) const {
     points.insert(it->second.points.begin(), it->second.points.end());
   }
   const std::set<KeyframeId> held = held_keyframes(map, moving, points, *problem);
+  problem->up_odom = up_in(map, map.keyframe(newest).part);
   copy_into(*problem, map, moving, held, points);
   std::erase_if(problem->edges_to_measure, [&](const auto& pair) {
     return !moving.contains(pair.from) && !held.contains(pair.from);
@@ -336,6 +347,7 @@ MappingTask MapBuilder::whole_map_task(const Map& map) const {
       points.insert(keyframe.points.begin(), keyframe.points.end());
     }
   }
+  problem->up_odom = up_in(map, map.newest_part());
   copy_into(*problem, map, moving, {}, points);
   return {.problem = problem};
 }

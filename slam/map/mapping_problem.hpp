@@ -14,6 +14,7 @@
 #include "cloud/depth_cloud.hpp"
 #include "cloud/gicp.hpp"
 #include "inertial/gyro_turn.hpp"
+#include "inertial/up_direction.hpp"
 #include "map/map.hpp"
 
 /// What goes into and comes out of one bundle adjustment, local or of the whole map: plain
@@ -26,6 +27,7 @@ struct MappingKeyframe {
   bool fixed = false;
   std::shared_ptr<const DepthCloud> cloud;  ///< null: none
   GyroTurn gyro{};                          ///< in the motion from the keyframe before
+  std::optional<UpDirection> up{};          ///< in the camera's frame
 };
 
 struct MappingPoint {
@@ -45,8 +47,9 @@ struct EdgeToMeasure {
 struct MappingProblem {
   std::vector<MappingKeyframe> keyframes;  ///< in order of id; at least one is fixed
   std::vector<MappingPoint> points;
-  std::vector<RelativeEdge> edges;  ///< known ones between keyframes of the problem
-  double gyro_random_walk = 0;      ///< ImuNoise::gyro_random_walk
+  std::vector<RelativeEdge> edges;     ///< known ones between keyframes of the problem
+  double gyro_random_walk = 0;         ///< ImuNoise::gyro_random_walk
+  std::optional<UpDirection> up_odom;  ///< none: gravity was not felt in this part of the map
   std::vector<EdgeToMeasure> edges_to_measure;
   CameraIntrinsics camera;
   PoseConfig pose;

@@ -38,7 +38,8 @@ ReckonedMotion operator*(const ReckonedMotion& first, const ReckonedMotion& seco
   return {.T_cam0_cam1 = T_cam0_cam2,  // frames: of both together, cam2 is the later one
           .covariance = A * first.covariance * A.transpose() + second.covariance,
           .legs = first.legs && second.legs,
-          .gyro = first.gyro.then(second.gyro, T_cam1_cam2.rotation_matrix())};
+          .gyro = first.gyro.then(second.gyro, T_cam1_cam2.rotation_matrix()),
+          .up = second.up};
 }
 
 DeadReckoner::DeadReckoner(const Switches& switches, const Calibration& calibration)
@@ -109,6 +110,8 @@ std::optional<ReckonedMotion> DeadReckoner::by_inertia(LegOdometry& odometry,
                  .taken_out = per_bias * before->bias.gyro_radps,
                  .bias = last_->bias.gyro_radps,
                  .bias_covariance = last_->gyro_bias_covariance};
+  motion.up = last_->up.seen_from(R_cam_imu_);
+  motion.up->variance *= doubt;
   return motion;
 }
 

@@ -8,6 +8,7 @@
 #include "geoflow/slam/config.hpp"
 
 #include "inertial/gyro_turn.hpp"
+#include "inertial/up_direction.hpp"
 #include "legs/leg_odometry.hpp"
 
 namespace geoflow::slam {
@@ -20,6 +21,7 @@ struct ReckonedMotion {
   Matrix6d covariance = Matrix6d::Zero();
   bool legs = false;  ///< feet or the robot's odometry had part in it
   GyroTurn gyro{};
+  std::optional<UpDirection> up{};  ///< in cam1; none without an IMU
 };
 
 /// One motion after the other.

@@ -19,6 +19,7 @@
 
 #include "cloud/gicp.hpp"
 #include "inertial/gyro_turn.hpp"
+#include "inertial/up_direction.hpp"
 #include "map/ids.hpp"
 #include "map/map.hpp"
 #include "map/mapping_problem.hpp"
@@ -54,6 +55,7 @@ class BundleAdjustment {
     add_keyframes();
     add_points();
     add_edges();
+    add_upright();
     run();
     collect();
     return std::move(*solution_);
@@ -179,6 +181,30 @@ class BundleAdjustment {
       }
     }
     std::ranges::for_each(solution_->measured, add);
+  }
+
+  /// Keeps the window upright, as the newest keyframe knows the accelerometer's bias. What else the
+  /// IMU errs by in one keyframe's tilt, it errs by in those about it: all of them count as one.
+  void add_upright() {
+    const auto newest = std::ranges::find_if(problem_.keyframes.rbegin(), problem_.keyframes.rend(),
+                                             [](const auto& k) { return k.up.has_value(); });
+    if (!problem_.up_odom || newest == problem_.keyframes.rend()) {
+      return;
+    }
+    const UpDirection& known = *newest->up;
+    const Vector3d up_odom = problem_.up_odom->given(known.bias);
+    for (const MappingKeyframe& keyframe : problem_.keyframes) {
+      if (!keyframe.up || keyframe.fixed) {
+        continue;
+      }
+      const UpDirection felt = keyframe.up->seen_from(keyframe.T_odom_cam.rotation_matrix());
+      const Matrix3d by_bias = felt.per_bias - problem_.up_odom->per_bias;
+      const double variance = felt.variance + problem_.up_odom->variance +
+                              (by_bias * known.bias_covariance * by_bias.transpose()).trace() / 2;
+      add_factor<UprightFactor>(&edge_loss_, {pose(keyframe.id).data()},
+                                keyframe.up->given(known.bias), up_odom,
+                                std::sqrt(problem_.mapping.window * variance));
+    }
   }
 
   /// The motion to a keyframe with the gyroscope's bias on the way, which is much the same as on

@@ -138,6 +138,18 @@ bool PointDepthFactor::Evaluate(const double* const* parameters, double* residua
   return true;
 }
 
+bool UprightFactor::Evaluate(const double* const* parameters, double* residuals,
+                             double** jacobians) const {
+  const Matrix3d R_odom_cam = from_block(parameters[0]).rotation_matrix();
+  Eigen::Map<Vector3d>{residuals} = (R_odom_cam * up_cam_ - up_odom_) / sigma_rad_;
+  if (jacobians != nullptr && jacobians[0] != nullptr) {
+    PoseJacobian<3> J{jacobians[0]};
+    J.setZero();
+    J.leftCols<3>() = -R_odom_cam * skew(up_cam_) / sigma_rad_;
+  }
+  return true;
+}
+
 RelativePoseFactor::RelativePoseFactor(const SE3& T_a_b, const Matrix6d& information)
     : T_b_a_{T_a_b.inverse()}, W_{root(information)} {}
 

@@ -68,6 +68,22 @@ class PointDepthFactor final : public ceres::SizedCostFunction<1, kPoseSize, 3> 
   double sigma_;
 };
 
+/// A camera that feels which way is up: (R up_cam - up_odom) / sigma, of unit vectors, sigma an
+/// angle [rad]; parameter: pose. It has two degrees of freedom; the third residual is of second
+/// order.
+class UprightFactor final : public ceres::SizedCostFunction<3, kPoseSize> {
+ public:
+  UprightFactor(const Vector3d& up_cam, const Vector3d& up_odom, double sigma_rad)
+      : up_cam_{up_cam}, up_odom_{up_odom}, sigma_rad_{sigma_rad} {}
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Vector3d up_cam_;
+  Vector3d up_odom_;
+  double sigma_rad_;
+};
+
 /// Relative pose of two cameras (paper, equation (5)): W log(Z^-1 Ta^-1 Tb), with W^T W the
 /// information of a right perturbation of Z = T_a_b; parameters: pose a, pose b.
 class RelativePoseFactor final

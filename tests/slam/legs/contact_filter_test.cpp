@@ -11,6 +11,8 @@
 #include "geoflow/hal/samples.hpp"
 #include "tests/support/data.hpp"
 
+#include "inertial/up_direction.hpp"
+
 namespace geoflow::slam {
 namespace {
 
@@ -68,6 +70,39 @@ Error error_of(const LeggedState& truth, const LeggedState& state) {
   delta.segment<3>(ContactFilter::kBeginAttitude) = so3::log(begin);
   delta.segment<3>(ContactFilter::kBeginPosition) = truth.p_odom_begin - begin * state.p_odom_begin;
   return delta;
+}
+
+/// What is known of the tilt if the accelerometer's bias is known, and how it follows from that.
+TEST(ContactFilter, UpIsToldWithWhatTheAccelerometersBiasDoesToIt) {
+  constexpr double kSigmaRad = 0.002;
+  std::mt19937_64 random{tests::test_seed(8)};
+  const LeggedState state = random_state(random);
+  const Matrix3d attitude_per_bias = 0.1 * Matrix3d::Random();
+  const Matrix3d of_bias = Vector3d{0.04, 0.01, 0.02}.asDiagonal();
+  ContactFilter::Covariance covariance = 1e-6 * ContactFilter::Covariance::Identity();
+  constexpr int kAttitude = ContactFilter::kAttitude;
+  constexpr int kBias = ContactFilter::kAccelBias;
+  covariance.block<3, 3>(kBias, kBias) = of_bias;
+  covariance.block<3, 3>(kAttitude, kBias) = attitude_per_bias * of_bias;
+  covariance.block<3, 3>(kBias, kAttitude) = of_bias * attitude_per_bias.transpose();
+  covariance.block<3, 3>(kAttitude, kAttitude) =
+      attitude_per_bias * of_bias * attitude_per_bias.transpose() +
+      kSigmaRad * kSigmaRad * Matrix3d::Identity();
+  ContactFilter filter;
+  filter.reset(state, covariance);
+  const UpDirection up = filter.up();
+  EXPECT_NEAR((state.q_odom_imu * up.up - Vector3d::UnitZ()).norm(), 0, 1e-12);
+  EXPECT_NEAR(up.variance, kSigmaRad * kSigmaRad, 1e-9);
+  EXPECT_EQ(up.bias, state.bias_accel);
+
+  const Vector3d bias_error{1e-3, -2e-3, 1e-3};
+  Error delta = Error::Zero();
+  delta.segment<3>(kBias) = bias_error;
+  delta.segment<3>(kAttitude) = attitude_per_bias * bias_error;
+  const LeggedState truth = moved(state, delta);
+  const Vector3d up_imu = truth.q_odom_imu.conjugate() * Vector3d::UnitZ();
+  EXPECT_NEAR((up.given(truth.bias_accel) - up_imu).norm(), 0, 1e-6);
+  EXPECT_GT((up.up - up_imu).norm(), 1e-5);
 }
 
 /// A covariance of rank one carries an error through the filter's own linearisation: it must be

@@ -40,6 +40,9 @@ TEST(Factors, JacobiansMatchDifferences) {
     expect_jacobians(ReprojectionFactor{pinhole, {300, 200}, 1.5}, {block_of(T_odom_cam), point});
     expect_jacobians(PointDepthFactor{1.7, 0.01}, {block_of(T_odom_cam), point});
 
+    expect_jacobians(UprightFactor{Vector3d::Random().normalized(), Vector3d::UnitZ(), 0.01},
+                     {block_of(T_odom_cam)});
+
     Matrix6d root = Matrix6d::Random() + 3 * Matrix6d::Identity();
     const SE3 T_a_b = random_pose(random, 0.6);
     const SE3 T_odom_b = T_odom_a * T_a_b * random_pose(random, 0.1);
