@@ -30,9 +30,11 @@ class Upright : public testing::Test {
  protected:
   /// Adds a keyframe where the registration to the one before says that it is.
   KeyframeId add(const SE3& T_before_this, const std::optional<UpDirection>& up) {
-    const SE3 T_odom_cam = newest_ ? map_.keyframe(*newest_).T_odom_cam * T_before_this : SE3{};
     Keyframe keyframe;
-    keyframe.T_odom_cam = T_odom_cam;
+    if (newest_) {
+      const SE3& T_odom_before = map_.keyframe(*newest_).T_odom_cam;
+      keyframe.T_odom_cam = T_odom_before * T_before_this;  // frames: this camera is the keyframe's
+    }
     keyframe.up = up;
     const KeyframeId id = map_.add_keyframe(keyframe);
     if (newest_) {
