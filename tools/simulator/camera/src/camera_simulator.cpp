@@ -299,8 +299,8 @@ Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_in
 
   // The longest exposure, whatever will be chosen, and depth's moment.
   const double half_s = 0.5 * (options.exposure_max_s + options.readout_s);
-  parts.rays->move_people(std::min(t_mid_exposure_s - half_s, t_depth_s),
-                          std::max(t_mid_exposure_s + half_s, t_depth_s));
+  parts.rays->people().move(std::min(t_mid_exposure_s - half_s, t_depth_s),
+                            std::max(t_mid_exposure_s + half_s, t_depth_s));
   parts.shader.move_people(t_mid_exposure_s);
   Rendered rendered;
   const auto see_color = [&] {
@@ -321,7 +321,7 @@ Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_in
     if (options.depth_truth) {
       rendered.depth_truth =
           true_depth(*parts.rays, parts.registration.color, T_world_cam(t_mid_exposure_s),
-                     parts.rays->ray_time(t_mid_exposure_s));
+                     parts.rays->people().ray_time(t_mid_exposure_s));
     }
   };
   tbb::parallel_invoke(see_color, see_depth);
