@@ -70,21 +70,6 @@ struct TripleLanes {
   }
 };
 
-/// Rays in a limb's axes, and for how long they are within its planes.
-struct Passage {
-  // Rows of what takes world to the limb's axes, times its determinant: `out` times them is a
-  // face's normal in world.
-  TripleLanes row_x;
-  TripleLanes row_y;
-  TripleLanes row_z;
-  TripleLanes from;
-  TripleLanes along;
-  Lanes enters;
-  Lanes leaves;
-  std::array<int, kLanes> met;   ///< the face that is crossed inwards last
-  std::array<int, kLanes> left;  ///< that is crossed outwards first
-};
-
 }  // namespace
 
 Limb::Axes::Axes(const Capsule& capsule, const Vector3f& away)
@@ -98,7 +83,7 @@ Limb::Limb(const Capsule& begin, const Capsule& end)
     : begin_{begin, away_from(begin)},
       change_{end, away_from(begin)},
       length_m_{(begin.end - begin.start).norm()},
-      faces_{} {
+      faces_{faces_of(begin)} {
   change_.start -= begin_.start;
   change_.side -= begin_.side;
   change_.other -= begin_.other;
@@ -107,113 +92,145 @@ Limb::Limb(const Capsule& begin, const Capsule& end)
     within_.extend(around(capsule.start, capsule.start_radius_m));
     within_.extend(around(capsule.end, capsule.end_radius_m));
   }
+}
+
+std::array<Limb::Face, Limb::kBands * Limb::kSides> Limb::faces_of(const Capsule& capsule) {
+  const float length_m = (capsule.end - capsule.start).norm();
   constexpr float kPi = std::numbers::pi_v<float>;
   constexpr float kEighth = std::numbers::sqrt2_v<float> / 2.0F;  // cosine and sine of 45 degrees
   // Rings of corners, from pole to pole: their radius, and their place along the axis.
-  const float start_m = begin.start_radius_m;
-  const float end_m = begin.end_radius_m;
+  const float start_m = capsule.start_radius_m;
+  const float end_m = capsule.end_radius_m;
   const std::array<std::pair<float, float>, kBands + 1> rings{
       {{0.0F, -start_m},
        {kEighth * start_m, -kEighth * start_m},
        {start_m, 0.0F},
-       {end_m, length_m_},
-       {kEighth * end_m, length_m_ + kEighth * end_m},
-       {0.0F, length_m_ + end_m}}};
+       {end_m, length_m},
+       {kEighth * end_m, length_m + kEighth * end_m},
+       {0.0F, length_m + end_m}}};
+  std::array<Face, kBands * kSides> faces{};
   constexpr std::array<std::size_t, kBands> kOrder{2, 0, 1, 3, 4};
   const float middle = std::cos(kPi / static_cast<float>(kSides));  // of a side, over its corners
-  for (std::size_t i = 0; i < faces_.size(); ++i) {
+  for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto [near_m, low_m] = rings[kOrder[i / kSides]];
     const auto [far_m, high_m] = rings[kOrder[i / kSides] + 1];
     const float turn =
         kPi * (2.0F * static_cast<float>(i % kSides) + 1.0F) / static_cast<float>(kSides);
     const float across = high_m - low_m;
     const float along = middle * (near_m - far_m);
-    faces_[i] = {.out = {across * std::cos(turn), across * std::sin(turn), along},
-                 .reach = across * middle * near_m + along * low_m};
+    faces[i] = {.out = {across * std::cos(turn), across * std::sin(turn), along},
+                .reach = across * middle * near_m + along * low_m};
   }
+  return faces;
 }
 
-void Limb::stop(std::uint32_t number, const Valid& valid, RTCRayHit16& packet) const {
-  with_wide_vectors([&]() __attribute__((always_inline)) {
-    // Copies, because what lies behind a reference might change with every ray that is written.
-    const RTCRay16 ray = packet.ray;
-    const Axes begin = begin_;
-    const Axes change = change_;
-    Passage way;
+/// Rays in a limb's axes, and for how long they are within its faces.
+struct Limb::Passage {
+  RTCRay16 ray;
+  Valid valid;
+  // Rows of what takes world to the limb's axes, times its determinant: `out` times them is a
+  // face's normal in world.
+  TripleLanes row_x;
+  TripleLanes row_y;
+  TripleLanes row_z;
+  TripleLanes from;
+  TripleLanes along;
+  Lanes enters;
+  Lanes leaves;
+  std::array<int, kLanes> met;   ///< the face that is crossed inwards last
+  std::array<int, kLanes> left;  ///< that is crossed outwards first
+
+  [[gnu::always_inline]] Passage(const RTCRay16& rays, const Valid& lanes, Axes begin, Axes change)
+      : ray{rays}, valid{lanes} {
     for (std::size_t i = 0; i < kLanes; ++i) {
       const float time = ray.time[i];
       const Triple start = at(time, begin.start, change.start);
       const Triple side = at(time, begin.side, change.side);
       const Triple other = at(time, begin.other, change.other);
       const Triple axis = at(time, begin.axis, change.axis);
-      const Triple row_x = cross(other, axis);
-      const Triple row_y = cross(axis, side);
-      const Triple row_z = cross(side, other);
-      const float inverse = 1.0F / dot(side, row_x);
-      const Triple from{
+      const Triple x = cross(other, axis);
+      const Triple y = cross(axis, side);
+      const Triple z = cross(side, other);
+      const float inverse = 1.0F / dot(side, x);
+      const Triple away{
           .x = ray.org_x[i] - start.x, .y = ray.org_y[i] - start.y, .z = ray.org_z[i] - start.z};
-      const Triple along{.x = ray.dir_x[i], .y = ray.dir_y[i], .z = ray.dir_z[i]};
-      way.row_x.set(i, row_x);
-      way.row_y.set(i, row_y);
-      way.row_z.set(i, row_z);
-      way.from.set(i, {.x = inverse * dot(row_x, from),
-                       .y = inverse * dot(row_y, from),
-                       .z = inverse * dot(row_z, from)});
-      way.along.set(i, {.x = inverse * dot(row_x, along),
-                        .y = inverse * dot(row_y, along),
-                        .z = inverse * dot(row_z, along)});
-      way.enters[i] = -kInfinity;
-      way.leaves[i] = kInfinity;
-      way.met[i] = 0;
-      way.left[i] = 0;
+      const Triple towards{.x = ray.dir_x[i], .y = ray.dir_y[i], .z = ray.dir_z[i]};
+      row_x.set(i, x);
+      row_y.set(i, y);
+      row_z.set(i, z);
+      from.set(i, {inverse * dot(x, away), inverse * dot(y, away), inverse * dot(z, away)});
+      along.set(i,
+                {inverse * dot(x, towards), inverse * dot(y, towards), inverse * dot(z, towards)});
+      enters[i] = -kInfinity;
+      leaves[i] = kInfinity;
+      met[i] = 0;
+      left[i] = 0;
     }
-    const auto cross_faces = [&](std::size_t first,
-                                 std::size_t last) __attribute__((always_inline)) {
-      for (std::size_t number_of_face = first; number_of_face < last; ++number_of_face) {
-        const Face face = faces_[number_of_face];
-        const auto here = static_cast<int>(number_of_face);
-        for (std::size_t i = 0; i < kLanes; ++i) {
-          const float room = face.reach - way.from.dot(i, face.out);
-          const float rate = way.along.dot(i, face.out);
-          const float t = room / rate;
-          const bool inwards = rate < 0.0F && t > way.enters[i];
-          const bool outwards = rate >= 0.0F && t < way.leaves[i];
-          way.enters[i] = inwards ? t : way.enters[i];
-          way.met[i] = inwards ? here : way.met[i];
-          way.leaves[i] = outwards ? t : way.leaves[i];
-          way.left[i] = outwards ? here : way.left[i];
-        }
-      }
-    };
-    cross_faces(0, kSides);
-    // Where rays come in through the rod's own sides, its ends do not matter.
-    int open = 0;
+  }
+
+  [[gnu::always_inline]] void cross_face(const Face face, int number) {
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const float place_m = way.from.z[i] + way.enters[i] * way.along.z[i];
-      const bool misses = way.enters[i] > way.leaves[i];
-      const bool on_rod = way.enters[i] > ray.tnear[i] && place_m >= 0.0F && place_m <= length_m_;
-      open |= misses || on_rod ? 0 : valid[i];
+      const float room = face.reach - from.dot(i, face.out);
+      const float rate = along.dot(i, face.out);
+      const float t = room / rate;
+      const bool inwards = rate < 0.0F && t > enters[i];
+      const bool outwards = rate >= 0.0F && t < leaves[i];
+      enters[i] = inwards ? t : enters[i];
+      met[i] = inwards ? number : met[i];
+      leaves[i] = outwards ? t : leaves[i];
+      left[i] = outwards ? number : left[i];
     }
-    if (open != 0) {
-      cross_faces(kSides, faces_.size());
+  }
+
+  /// Once the rod's own faces are crossed: do its ends matter to any ray that may be within?
+  [[nodiscard, gnu::always_inline]] bool ends_matter(float length_m) const {
+    int any = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float place_m = from.z[i] + enters[i] * along.z[i];
+      const int inside = enters[i] > ray.tnear[i] ? 0 : valid[i];
+      const int low = place_m >= 0.0F ? inside : valid[i];
+      const int beyond = place_m <= length_m ? low : valid[i];
+      any |= enters[i] <= leaves[i] ? beyond : 0;
+    }
+    return any != 0;
+  }
+
+  /// Where a ray meets the limb; a ray from within meets it from behind.
+  [[nodiscard]] bool from_outside(std::size_t i) const { return enters[i] > ray.tnear[i]; }
+  [[nodiscard]] bool meets(std::size_t i) const {
+    const float t = from_outside(i) ? enters[i] : leaves[i];
+    return valid[i] != 0 && enters[i] <= leaves[i] && t > ray.tnear[i] && t < ray.tfar[i];
+  }
+  [[nodiscard]] Vector3f normal(std::size_t i, const Vector3f& out) const {
+    return {out[0] * row_x.x[i] + out[1] * row_y.x[i] + out[2] * row_z.x[i],
+            out[0] * row_x.y[i] + out[1] * row_y.y[i] + out[2] * row_z.y[i],
+            out[0] * row_x.z[i] + out[1] * row_y.z[i] + out[2] * row_z.z[i]};
+  }
+};
+
+void Limb::stop(std::uint32_t number, const Valid& valid, RTCRayHit16& packet) const {
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    Passage way{packet.ray, valid, begin_, change_};
+    for (std::size_t face = 0; face < kSides; ++face) {
+      way.cross_face(faces_[face], static_cast<int>(face));
+    }
+    const bool all = way.ends_matter(length_m_);
+    for (std::size_t face = kSides; all && face < faces_.size(); ++face) {
+      way.cross_face(faces_[face], static_cast<int>(face));
     }
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const bool from_outside = way.enters[i] > ray.tnear[i];
-      const float t = from_outside ? way.enters[i] : way.leaves[i];
-      if (valid[i] == 0 || way.enters[i] > way.leaves[i] || t <= ray.tnear[i] || t >= ray.tfar[i]) {
+      if (!way.meets(i)) {
         continue;
       }
-      const auto face = static_cast<std::size_t>(from_outside ? way.met[i] : way.left[i]);
-      const Vector3f& out = faces_[face].out;
-      packet.ray.tfar[i] = t;
+      const bool outside = way.from_outside(i);
+      const auto face = static_cast<std::size_t>(outside ? way.met[i] : way.left[i]);
+      const Vector3f normal = way.normal(i, faces_[face].out);
+      packet.ray.tfar[i] = outside ? way.enters[i] : way.leaves[i];
       packet.hit.geomID[i] = static_cast<unsigned>(HitKind::kPerson);
       packet.hit.primID[i] = number;
-      packet.hit.Ng_x[i] =
-          out[0] * way.row_x.x[i] + out[1] * way.row_y.x[i] + out[2] * way.row_z.x[i];
-      packet.hit.Ng_y[i] =
-          out[0] * way.row_x.y[i] + out[1] * way.row_y.y[i] + out[2] * way.row_z.y[i];
-      packet.hit.Ng_z[i] =
-          out[0] * way.row_x.z[i] + out[1] * way.row_y.z[i] + out[2] * way.row_z.z[i];
+      packet.hit.Ng_x[i] = normal.x();
+      packet.hit.Ng_y[i] = normal.y();
+      packet.hit.Ng_z[i] = normal.z();
     }
   });
 }

@@ -48,6 +48,9 @@ class Limb {
     float reach;
   };
 
+  struct Passage;
+  [[nodiscard]] static std::array<Face, kBands * kSides> faces_of(const Capsule& capsule);
+
   Axes begin_;
   Axes change_;  ///< from time 0 to time 1
   float length_m_;

@@ -64,28 +64,35 @@ struct Covered {
 Covered cover(const Projection& projection, const CameraIntrinsics& color, const Lanes& depths_m,
               int x, int y) {
   constexpr float kNearest_m = 0.01F;
-  constexpr auto kLargest = static_cast<float>(std::numeric_limits<std::uint16_t>::max());
+  constexpr int kLargest_mm = std::numeric_limits<std::uint16_t>::max();
   Covered covered;
   with_wide_vectors([&]() __attribute__((always_inline)) {
+    // Copies: GCC makes no vectors of what it loads through a constant reference in here.
     const Projection to_color = projection;
+    const Lanes all_m = depths_m;
+    Covered found;
     const int width = color.width;
     const int height = color.height;
     const auto row = static_cast<float>(y);
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const float depth_m = depths_m[i];
+      const float depth_m = all_m[i];
       const auto column = static_cast<float>(x + static_cast<int>(i));
       const float centre_m = to_color.project(column, row, depth_m).depth_m;
-      const float rounded = held(kMillimetres * centre_m + 0.5F, 0.0F, kLargest + 1.0F);
+      const float rounded =
+          held(kMillimetres * centre_m + 0.5F, 0.0F, static_cast<float>(kLargest_mm + 1));
+      // One choice after the other: GCC makes no vectors of a choice between truths.
       const auto millimetres = static_cast<int>(rounded);
-      const bool seen = depth_m > 0.0F && centre_m >= kNearest_m && rounded < kLargest + 1.0F;
-      covered.depth_mm[i] = seen ? millimetres : 0;
+      const int held_mm = millimetres <= kLargest_mm ? millimetres : 0;
+      const int far_mm = centre_m >= kNearest_m ? held_mm : 0;
+      found.depth_mm[i] = depth_m > 0.0F ? far_mm : 0;
       const auto low = to_color.project(column - 0.5F, row - 0.5F, depth_m);
       const auto high = to_color.project(column + 0.5F, row + 0.5F, depth_m);
-      covered.left[i] = std::max(0, pixel_at(low.x, width));
-      covered.top[i] = std::max(0, pixel_at(low.y, height));
-      covered.right[i] = std::min(width - 1, pixel_at(high.x, width));
-      covered.bottom[i] = std::min(height - 1, pixel_at(high.y, height));
+      found.left[i] = std::max(0, pixel_at(low.x, width));
+      found.top[i] = std::max(0, pixel_at(low.y, height));
+      found.right[i] = std::min(width - 1, pixel_at(high.x, width));
+      found.bottom[i] = std::min(height - 1, pixel_at(high.y, height));
     }
+    covered = found;
   });
   return covered;
 }

@@ -67,14 +67,18 @@ void SmoothNoise::row(int y, std::vector<float>& out) const {
     const Across& across = across_[x / kLanes];
     Lanes field;
     with_wide_vectors([&]() __attribute__((always_inline)) {
+      // A copy: GCC makes no vectors of what it loads through a constant reference in here.
+      const Across places = across;
       const float* const nodes = blended.data();
       const float scale = down.scale;
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        float sum = 0;
-        for (std::size_t k = 0; k < across.weight.size(); ++k) {
-          sum += across.weight[k][i] * nodes[across.first[i] + k];
+      Lanes sum{};
+      for (std::size_t k = 0; k < places.weight.size(); ++k) {
+        for (std::size_t i = 0; i < kLanes; ++i) {
+          sum[i] += places.weight[k][i] * nodes[places.first[i] + k];
         }
-        field[i] = sum * across.scale[i] * scale;
+      }
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        field[i] = sum[i] * places.scale[i] * scale;
       }
     });
     std::copy_n(field.begin(), std::min(kLanes, width_ - x),
