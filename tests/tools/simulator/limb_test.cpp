@@ -1,7 +1,6 @@
 #include "src/limb.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 

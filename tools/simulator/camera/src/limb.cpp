@@ -140,6 +140,8 @@ struct Limb::Passage {
   std::array<int, kLanes> met;   ///< the face that is crossed inwards last
   std::array<int, kLanes> left;  ///< that is crossed outwards first
 
+  // Copies of the axes: what lies behind a reference might change with every number that is set.
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init,performance-unnecessary-value-param)
   [[gnu::always_inline]] Passage(const RTCRay16& rays, const Valid& lanes, Axes begin, Axes change)
       : ray{rays}, valid{lanes} {
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -158,9 +160,12 @@ struct Limb::Passage {
       row_x.set(i, x);
       row_y.set(i, y);
       row_z.set(i, z);
-      from.set(i, {inverse * dot(x, away), inverse * dot(y, away), inverse * dot(z, away)});
-      along.set(i,
-                {inverse * dot(x, towards), inverse * dot(y, towards), inverse * dot(z, towards)});
+      from.set(
+          i,
+          {.x = inverse * dot(x, away), .y = inverse * dot(y, away), .z = inverse * dot(z, away)});
+      along.set(i, {.x = inverse * dot(x, towards),
+                    .y = inverse * dot(y, towards),
+                    .z = inverse * dot(z, towards)});
       enters[i] = -kInfinity;
       leaves[i] = kInfinity;
       met[i] = 0;
@@ -168,7 +173,8 @@ struct Limb::Passage {
     }
   }
 
-  [[gnu::always_inline]] void cross_face(const Face face, int number) {
+  [[gnu::always_inline]] void cross_face(const Face& crossed, int number) {
+    const Face face = crossed;
     for (std::size_t i = 0; i < kLanes; ++i) {
       const float room = face.reach - from.dot(i, face.out);
       const float rate = along.dot(i, face.out);

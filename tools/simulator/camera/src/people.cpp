@@ -46,6 +46,7 @@ struct Beam {
   Lanes end;
   Valid valid;
 
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): the loop sets them
   [[gnu::always_inline]] Beam(const Valid& lanes, const RTCRay16& ray) : valid{lanes} {
     for (std::size_t i = 0; i < kLanes; ++i) {
       x[i] = ray.org_x[i];
@@ -60,8 +61,8 @@ struct Beam {
   }
   /// Is any of them in a box on its way?
   [[nodiscard, gnu::always_inline]] bool crosses(const Eigen::AlignedBox3f& box) const {
-    const Eigen::Vector3f low = box.min();
-    const Eigen::Vector3f high = box.max();
+    const Eigen::Vector3f& low = box.min();
+    const Eigen::Vector3f& high = box.max();
     int any = 0;
     for (std::size_t i = 0; i < kLanes; ++i) {
       Stretch met{.enters = begin[i], .leaves = end[i]};
@@ -117,15 +118,13 @@ void People::stop(const Valid& valid, RTCRayHit16& packet) const {
   }
   with_wide_vectors([&]() __attribute__((always_inline)) {
     const Beam beam{valid, packet.ray};
-    for (std::size_t body = 0; body < bodies_.size(); ++body) {
-      if (!beam.crosses(bodies_[body])) {
-        continue;
+    bool near = false;  // the person whose limb it is
+    for (std::size_t limb = 0; limb < limbs_.size(); ++limb) {
+      if (limb % Pedestrian::kCapsules == 0) {
+        near = beam.crosses(bodies_[limb / Pedestrian::kCapsules]);
       }
-      const std::size_t first = body * Pedestrian::kCapsules;
-      for (std::size_t limb = first; limb < first + Pedestrian::kCapsules; ++limb) {
-        if (beam.crosses(limbs_[limb].within())) {
-          limbs_[limb].stop(static_cast<std::uint32_t>(limb), valid, packet);
-        }
+      if (near && beam.crosses(limbs_[limb].within())) {
+        limbs_[limb].stop(static_cast<std::uint32_t>(limb), valid, packet);
       }
     }
   });

@@ -1,7 +1,6 @@
 #include "src/ray_scene.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +14,6 @@
 #include <embree3/rtcore.h>
 
 #include "geoflow/hal/result.hpp"
-#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/candidates.hpp"

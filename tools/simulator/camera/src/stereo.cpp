@@ -58,6 +58,13 @@ std::vector<float> true_disparity(const InfraredView& seen, float focal_baseline
   return -kSteepness * kRipple_px * beyond_half * (1.0F - 2.0F * std::abs(beyond_half));
 }
 
+/// 0 where `value` is beyond either bound. One choice after the other: GCC makes no vectors of a
+/// choice between truths.
+[[gnu::always_inline]] inline float zero_beyond(float value, float low, float high) noexcept {
+  const float not_above = value <= high ? value : 0.0F;
+  return value >= low ? not_above : 0.0F;
+}
+
 /// One row's worth of what is random.
 struct RandomRow {
   std::vector<float> noise;
@@ -174,8 +181,7 @@ class Matcher {
             static_cast<float>(whole_below(kSubpixelSteps * noisy + 0.5F)) / kSubpixelSteps;
         const float disparity = rounds ? stepped : noisy;
         const float depth = focal_baseline / disparity;
-        const float not_beyond = depth <= farthest_m ? depth : 0.0F;
-        const float within = depth >= nearest_m ? not_beyond : 0.0F;
+        const float within = zero_beyond(depth, nearest_m, farthest_m);
         const float positive = disparity > 0.0F ? within : 0.0F;
         depth_m[i] = found[i] > 0.0F ? positive : 0.0F;
       }

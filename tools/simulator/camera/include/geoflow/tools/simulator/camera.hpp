@@ -58,6 +58,13 @@ struct CameraOptions {
 /// The knobs of CameraOptions, "camera.…".
 [[nodiscard]] std::span<const Knob<CameraOptions>> camera_knobs();
 
+/// CPU time that a frame's steps took of the threads that began them [s]: all of it where the TBB
+/// arena has one thread.
+struct RenderCost {
+  double light_s = 0;   ///< what there is to see: rays traced, surfaces shaded
+  double sensor_s = 0;  ///< what the sensors make of it: noise, stereo matching, registration
+};
+
 /// One pair of images and what is true of them.
 struct Rendered {
   FrameRef color;
@@ -66,6 +73,7 @@ struct Rendered {
                                    ///< view at mid exposure; 0: sky; empty unless wanted
   double exposure_s = 0;
   double gain = 1;
+  RenderCost cost{};
 };
 
 /// Renders frames of one scene; the scene must outlive it. Frames may be rendered in any order: a
