@@ -174,6 +174,7 @@ struct Limb::Passage {
   }
 
   [[gnu::always_inline]] void cross_face(const Face& crossed, int number) {
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): as the axes
     const Face face = crossed;
     for (std::size_t i = 0; i < kLanes; ++i) {
       const float room = face.reach - from.dot(i, face.out);
