@@ -106,10 +106,10 @@ class CameraSimulator {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Lets the whole program keep the memory that it frees. A frame takes and frees some twenty
-/// megabytes: given back to the kernel, their pages are faulted in anew for the next one, which
-/// takes a third of the time to render it. For programs that render many, before they start
-/// threads.
+/// Lets the whole program keep the memory that it frees. A frame of 640 x 480 takes and frees some
+/// eleven megabytes: given back to the kernel, their pages are faulted in anew for the next one,
+/// which was measured to add 0.44 to the time that it takes (docs/benchmarks.md). For programs that
+/// render many, before they start threads.
 void keep_freed_memory() noexcept;
 
 /// Pose of the left infrared camera in the colour camera's frame, as calibrated on a D435i.
