@@ -30,16 +30,14 @@ using simulator::SimulationCost;
 using simulator::SimulationOptions;
 
 constexpr std::size_t kWarmUp = 5;  // frames before the clock is read
-constexpr int kShorter = 3;         // times, with one thread
 constexpr double kMillisecondsPerSecond = 1e3;
 
-SimulationOptions walk_of(const SimulateBenchmarkOptions& options, const std::string& scene,
-                          int frames) {
+SimulationOptions walk_of(const SimulateBenchmarkOptions& options, const std::string& scene) {
   SimulationOptions walk{.scene = scene, .seed = options.seed};
   walk.walk.stand_s = 0;
   walk.camera.width = options.width;
   walk.camera.height = options.height;
-  walk.duration_s = (frames - 0.5) / walk.recording.frame_rate_hz;
+  walk.duration_s = (options.frames - 0.5) / walk.recording.frame_rate_hz;
   return walk;
 }
 
@@ -87,30 +85,28 @@ Result<Measured> measure(const SimulationOptions& options) {
 
 Result<std::vector<BenchCell>> row_of(const SimulateBenchmarkOptions& options,
                                       const std::string& scene) {
-  const auto whole = measure(walk_of(options, scene, options.frames));
+  const SimulationOptions walk = walk_of(options, scene);
+  const auto whole = measure(walk);
   if (!whole) {
     return tl::unexpected{whole.error()};
   }
-  const int fewer = options.frames / kShorter;
   std::optional<Result<Measured>> alone;
-  tbb::task_arena{1}.execute([&] { alone = measure(walk_of(options, scene, fewer)); });
+  tbb::task_arena{1}.execute([&] { alone = measure(walk); });
   if (!*alone) {
     return tl::unexpected{alone->error()};
   }
-  const auto a_frame_ms = [](double seconds, double frames) {
-    return kMillisecondsPerSecond * seconds / frames;
-  };
-  const auto frames = static_cast<double>(whole->frames);
+  const double frames = options.frames;
+  const auto timed = static_cast<double>(whole->frames);
   const SimulationCost& cost = (*alone)->cost;
   return std::vector<BenchCell>{scene,
                                 std::int64_t{options.frames},
                                 std::int64_t{tbb::this_task_arena::max_concurrency()},
                                 whole->start_s,
-                                frames / whole->wall_s,
-                                a_frame_ms(whole->cpu_s, frames),
-                                a_frame_ms(cost.render.light_s, fewer),
-                                a_frame_ms(cost.render.sensor_s, fewer),
-                                a_frame_ms(cost.delivery_s, fewer)};
+                                timed / whole->wall_s,
+                                kMillisecondsPerSecond * whole->cpu_s / timed,
+                                kMillisecondsPerSecond * cost.render.light_s / frames,
+                                kMillisecondsPerSecond * cost.render.sensor_s / frames,
+                                kMillisecondsPerSecond * cost.delivery_s / frames};
 }
 
 }  // namespace

@@ -31,8 +31,8 @@ inline constexpr int kFewestBenchmarkFrames = 30;
 /// Makes recordings as `geoflow simulate` does, in a temporary folder, and measures how fast. One
 /// row for each scene: `start_s` until the first frame can be rendered; `frames_per_s` of wall time
 /// and `cpu_ms` a frame (of all threads) with as many threads as `threads` says; then the parts of
-/// a frame's CPU time in a run of its own with one thread, a third as long: `light_ms` to trace and
-/// shade what is seen, `sensor_ms` for what the sensors make of it, `writing_ms` to compress and
+/// a frame's CPU time in a run of its own with one thread: `light_ms` to trace and shade what is
+/// seen, `sensor_ms` for what the sensors make of it, `writing_ms` to compress and
 /// write, with inertial and leg samples. Blocks. `progress` gets scenes done and all; false ends it
 /// early, with the rows that are whole. Errors: a scene or size that cannot be; the disk.
 [[nodiscard]] Result<BenchTable> run_simulate_benchmark(
