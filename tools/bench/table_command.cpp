@@ -96,8 +96,7 @@ void TableCommand::declare(CLI::App& command) {
   command.add_option("--data", data_, "Folder with its sequences, at any depth")->required();
   command.add_option("-o,--output", output_,
                      "Folder for results (default: out/table-SUITE); each run has SEQUENCE/ROW");
-  command
-      .add_option("--rows", rows_, "Only these rows, by commas: r, r+o, r+i, r+d, r+o+i+d")
+  command.add_option("--rows", rows_, "Only these rows, by commas: r, r+o, r+i, r+d, r+o+i+d")
       ->delimiter(',')
       ->allow_extra_args(false);
   command

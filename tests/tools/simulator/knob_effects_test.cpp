@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,99 +33,117 @@ using simulator::Simulation;
 using simulator::SimulationOptions;
 using testing::IsSubsetOf;
 
-/// How far a knob is turned, and what must be so that it matters.
+/// How far each knob is turned; behind it, another one that must be turned for it to matter.
+constexpr std::string_view kTurns = R"(scene.light_level=0.1
+scene.texture_contrast=2
+scene.reflectivity=5
+scene.pedestrians=9
+camera.width=80
+camera.height=60
+camera.exposure_min_s=0.03 scene.light_level=50
+camera.exposure_max_s=0.002
+camera.gain_max=2 scene.light_level=0.01
+camera.exposure_compensation=2
+camera.noise_scale=3
+camera.subexposures=2
+camera.readout_s=0.005
+camera.depth_offset_s=0.03
+camera.depth_noise_scale=2
+camera.depth_errors=0
+camera.depth_subpixel_px=0.3
+camera.depth_calibration_px=0.3
+camera.depth_min_m=1.5
+camera.depth_max_m=1.5
+camera.projector_power=0.1
+robot.speed_mps=0.4
+robot.speed_variation=0.4
+robot.yaw_rate_radps=0.2
+robot.stand_s=0.4
+robot.pause_interval_s=2
+robot.pause_s=5 robot.pause_interval_s=2
+robot.gait_hz=2.7
+robot.gait_variation=0.08
+robot.duty=0.7
+robot.jitter=1.25
+robot.jitter_variation=0.4
+robot.wander=2
+robot.body_height_m=0.28
+robot.step_height_m=0.1
+robot.touchdown_mps=0.5
+robot.foothold_noise_m=0.02
+robot.rolling_radius_m=0
+robot.slip_probability=0.5
+robot.slip_length_m=0.05 robot.slip_probability=0.5
+robot.ground_sink_m=0.02
+legs.rate_hz=250
+legs.angle_noise_rad=0.005
+legs.angle_offset_rad=0.02
+legs.rate_noise_scale=3
+legs.quantise=0
+legs.torque_noise_nm=2
+legs.torque_scale_error=0.15
+legs.friction_nm=1.5
+legs.leg_mass_scale=0
+legs.force_offset_counts=150
+legs.force_counts_per_n=3
+legs.force_rise_s=0.2
+legs.force_noise_counts=20
+imu.rate_hz=400
+imu.noise_scale=5
+imu.accel_bias_mps2=0.5
+imu.gyro_bias_radps=0.05
+imu.scale_error=0.03
+imu.misalignment_rad=0.03
+imu.gyro_per_accel=0.005
+imu.quantise=0
+imu.accel_range_mps2=10
+imu.gyro_range_radps=1 robot.jitter=2
+imu.shock_mps2=40
+imu.shock_gyro_radps=2
+imu.shock_ring_hz=60
+imu.shock_damping=0.5
+imu.fault_interval_s=1
+imu.fault_s=5 imu.fault_interval_s=1
+imu.fault_mps2=60 imu.fault_interval_s=1
+recording.frame_rate_hz=2
+recording.camera_latency_s=0.1
+recording.camera_jitter_s=0.05
+recording.imu_latency_s=0.1
+recording.imu_jitter_s=0.05
+recording.leg_latency_s=0.1
+recording.leg_jitter_s=0.05
+recording.device_clocks=1
+recording.clock_drift_ppm=300 recording.device_clocks=1
+recording.odometry_rate_hz=50
+recording.odometry_scale_error=0.2
+recording.odometry_noise_mps=0.5
+recording.odometry_gyro_noise_radps=0.5)";
+
 struct Turn {
-  std::string_view knob;
-  std::string_view value;
-  std::string_view given = "";  ///< another knob
+  std::string setting;
+  std::vector<std::string> given;
+
+  [[nodiscard]] std::string_view knob() const {
+    return std::string_view{setting}.substr(0, setting.find('='));
+  }
+  [[nodiscard]] std::string_view room() const {
+    return std::string_view{setting}.substr(0, setting.find('.'));
+  }
 };
 
-constexpr std::array kTurns{
-    Turn{"scene.light_level", "0.1"},
-    Turn{"scene.texture_contrast", "2"},
-    Turn{"scene.reflectivity", "5"},
-    Turn{"scene.pedestrians", "9"},
-    Turn{"camera.width", "80"},
-    Turn{"camera.height", "60"},
-    Turn{"camera.exposure_min_s", "0.03", "scene.light_level=50"},
-    Turn{"camera.exposure_max_s", "0.002"},
-    Turn{"camera.gain_max", "2", "scene.light_level=0.01"},
-    Turn{"camera.exposure_compensation", "2"},
-    Turn{"camera.noise_scale", "3"},
-    Turn{"camera.subexposures", "2"},
-    Turn{"camera.readout_s", "0.005"},
-    Turn{"camera.depth_offset_s", "0.03"},
-    Turn{"camera.depth_noise_scale", "2"},
-    Turn{"camera.depth_errors", "0"},
-    Turn{"camera.depth_subpixel_px", "0.3"},
-    Turn{"camera.depth_calibration_px", "0.3"},
-    Turn{"camera.depth_min_m", "1.5"},
-    Turn{"camera.depth_max_m", "1.5"},
-    Turn{"camera.projector_power", "0.1"},
-    Turn{"robot.speed_mps", "0.4"},
-    Turn{"robot.speed_variation", "0.4"},
-    Turn{"robot.yaw_rate_radps", "0.2"},
-    Turn{"robot.stand_s", "0.4"},
-    Turn{"robot.pause_interval_s", "2"},
-    Turn{"robot.pause_s", "5", "robot.pause_interval_s=2"},
-    Turn{"robot.gait_hz", "2.7"},
-    Turn{"robot.gait_variation", "0.08"},
-    Turn{"robot.duty", "0.7"},
-    Turn{"robot.jitter", "1.25"},
-    Turn{"robot.jitter_variation", "0.4"},
-    Turn{"robot.wander", "2"},
-    Turn{"robot.body_height_m", "0.28"},
-    Turn{"robot.step_height_m", "0.1"},
-    Turn{"robot.touchdown_mps", "0.5"},
-    Turn{"robot.foothold_noise_m", "0.02"},
-    Turn{"robot.rolling_radius_m", "0"},
-    Turn{"robot.slip_probability", "0.5"},
-    Turn{"robot.slip_length_m", "0.05", "robot.slip_probability=0.5"},
-    Turn{"robot.ground_sink_m", "0.02"},
-    Turn{"legs.rate_hz", "250"},
-    Turn{"legs.angle_noise_rad", "0.005"},
-    Turn{"legs.angle_offset_rad", "0.02"},
-    Turn{"legs.rate_noise_scale", "3"},
-    Turn{"legs.quantise", "0"},
-    Turn{"legs.torque_noise_nm", "2"},
-    Turn{"legs.torque_scale_error", "0.15"},
-    Turn{"legs.friction_nm", "1.5"},
-    Turn{"legs.leg_mass_scale", "0"},
-    Turn{"legs.force_offset_counts", "150"},
-    Turn{"legs.force_counts_per_n", "3"},
-    Turn{"legs.force_rise_s", "0.2"},
-    Turn{"legs.force_noise_counts", "20"},
-    Turn{"imu.rate_hz", "400"},
-    Turn{"imu.noise_scale", "5"},
-    Turn{"imu.accel_bias_mps2", "0.5"},
-    Turn{"imu.gyro_bias_radps", "0.05"},
-    Turn{"imu.scale_error", "0.03"},
-    Turn{"imu.misalignment_rad", "0.03"},
-    Turn{"imu.gyro_per_accel", "0.005"},
-    Turn{"imu.quantise", "0"},
-    Turn{"imu.accel_range_mps2", "10"},
-    Turn{"imu.gyro_range_radps", "1", "robot.jitter=2"},
-    Turn{"imu.shock_mps2", "40"},
-    Turn{"imu.shock_gyro_radps", "2"},
-    Turn{"imu.shock_ring_hz", "60"},
-    Turn{"imu.shock_damping", "0.5"},
-    Turn{"imu.fault_interval_s", "1"},
-    Turn{"imu.fault_s", "5", "imu.fault_interval_s=1"},
-    Turn{"imu.fault_mps2", "60", "imu.fault_interval_s=1"},
-    Turn{"recording.frame_rate_hz", "2"},
-    Turn{"recording.camera_latency_s", "0.1"},
-    Turn{"recording.camera_jitter_s", "0.05"},
-    Turn{"recording.imu_latency_s", "0.1"},
-    Turn{"recording.imu_jitter_s", "0.05"},
-    Turn{"recording.leg_latency_s", "0.1"},
-    Turn{"recording.leg_jitter_s", "0.05"},
-    Turn{"recording.device_clocks", "1"},
-    Turn{"recording.clock_drift_ppm", "300", "recording.device_clocks=1"},
-    Turn{"recording.odometry_rate_hz", "50"},
-    Turn{"recording.odometry_scale_error", "0.2"},
-    Turn{"recording.odometry_noise_mps", "0.5"},
-    Turn{"recording.odometry_gyro_noise_radps", "0.5"},
-};
+std::vector<Turn> turns() {
+  std::vector<Turn> all;
+  std::istringstream lines{std::string{kTurns}};
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words{line};
+    Turn& turn = all.emplace_back();
+    words >> turn.setting;
+    for (std::string other; words >> other;) {
+      turn.given.push_back(other);
+    }
+  }
+  return all;
+}
 
 /// All that each stream says, as bytes.
 using Streams = std::map<std::string_view, std::string>;
@@ -214,10 +233,6 @@ Streams simulate(const std::vector<std::string>& settings) {
   return streams;
 }
 
-std::string_view room_of(std::string_view knob) {
-  return knob.substr(0, knob.find('.'));
-}
-
 /// What a room's knobs may change.
 std::set<std::string_view> about(std::string_view room) {
   if (room == "scene" || room == "camera") {
@@ -234,17 +249,16 @@ class KnobsOf : public testing::TestWithParam<const char*> {};
 TEST_P(KnobsOf, ChangeWhatTheyAreAboutAndNothingElse) {
   const Streams usual = simulate({});
   EXPECT_TRUE(differences(usual, simulate({})).empty());
-  for (const Turn& turn : kTurns) {
-    if (room_of(turn.knob) != GetParam()) {
+  for (const Turn& turn : turns()) {
+    if (turn.room() != GetParam()) {
       continue;
     }
-    const std::vector<std::string> given =
-        turn.given.empty() ? std::vector<std::string>{} : std::vector{std::string{turn.given}};
-    std::vector<std::string> turned = given;
-    turned.push_back(std::string{turn.knob} + "=" + std::string{turn.value});
-    const auto changed = differences(given.empty() ? usual : simulate(given), simulate(turned));
-    EXPECT_FALSE(changed.empty()) << turned.back() << " changes nothing";
-    EXPECT_THAT(changed, IsSubsetOf(about(room_of(turn.knob)))) << turned.back();
+    std::vector<std::string> turned = turn.given;
+    turned.push_back(turn.setting);
+    const auto changed =
+        differences(turn.given.empty() ? usual : simulate(turn.given), simulate(turned));
+    EXPECT_FALSE(changed.empty()) << turn.setting << " changes nothing";
+    EXPECT_THAT(changed, IsSubsetOf(about(turn.room()))) << turn.setting;
   }
 }
 
@@ -257,9 +271,10 @@ TEST(KnobTurns, AreOfAllKnobs) {
   for (const simulator::KnobInfo& knob : all_knobs()) {
     known.insert(knob.name);
   }
+  const std::vector<Turn> all = turns();
   std::set<std::string_view> turned;
-  for (const Turn& turn : kTurns) {
-    turned.insert(turn.knob);
+  for (const Turn& turn : all) {
+    turned.insert(turn.knob());
   }
   EXPECT_EQ(turned, known);
 }
