@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,8 +34,6 @@ constexpr double kMillisecondsPerSecond = 1e3;
 SimulationOptions walk_of(const SimulateBenchmarkOptions& options, const std::string& scene) {
   SimulationOptions walk{.scene = scene, .seed = options.seed};
   walk.walk.stand_s = 0;
-  walk.camera.width = options.width;
-  walk.camera.height = options.height;
   walk.duration_s = (options.frames - 0.5) / walk.recording.frame_rate_hz;
   return walk;
 }
@@ -90,14 +87,13 @@ Result<std::vector<BenchCell>> row_of(const SimulateBenchmarkOptions& options,
   if (!whole) {
     return tl::unexpected{whole.error()};
   }
-  std::optional<Result<Measured>> alone;
-  tbb::task_arena{1}.execute([&] { alone = measure(walk); });
-  if (!*alone) {
-    return tl::unexpected{alone->error()};
+  const auto alone = tbb::task_arena{1}.execute([&] { return measure(walk); });
+  if (!alone) {
+    return tl::unexpected{alone.error()};
   }
   const double frames = options.frames;
   const auto timed = static_cast<double>(whole->frames);
-  const SimulationCost& cost = (*alone)->cost;
+  const SimulationCost& cost = alone->cost;
   return std::vector<BenchCell>{scene,
                                 std::int64_t{options.frames},
                                 std::int64_t{tbb::this_task_arena::max_concurrency()},

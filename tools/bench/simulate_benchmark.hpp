@@ -19,8 +19,6 @@ struct SimulateBenchmarkOptions {
   std::uint64_t seed = 1;
   // NOLINTNEXTLINE(readability-magic-numbers): named by its member
   int frames = 60;  ///< of each scene; at least kFewestBenchmarkFrames
-  int width = 640;  ///< [px]
-  int height = 480;
 };
 inline constexpr int kFewestBenchmarkFrames = 30;
 
@@ -34,7 +32,7 @@ inline constexpr int kFewestBenchmarkFrames = 30;
 /// a frame's CPU time in a run of its own with one thread: `light_ms` to trace and shade what is
 /// seen, `sensor_ms` for what the sensors make of it, `writing_ms` to compress and
 /// write, with inertial and leg samples. Blocks. `progress` gets scenes done and all; false ends it
-/// early, with the rows that are whole. Errors: a scene or size that cannot be; the disk.
+/// early, with the rows that are whole. Errors: a scene that cannot be; the disk.
 [[nodiscard]] Result<BenchTable> run_simulate_benchmark(
     const SimulateBenchmarkOptions& options,
     const std::function<bool(std::size_t done, std::size_t total)>& progress);

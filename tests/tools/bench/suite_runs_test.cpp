@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -95,6 +94,7 @@ class SuiteRuns : public testing::Test {
   }
 
   /// Runs a command, which must end well, and says what it printed.
+  // NOLINTNEXTLINE(modernize-use-nodiscard): what it prints matters to few
   std::string run(const std::vector<std::string>& arguments) const {
     const Command command{.arguments = arguments, .log = scratch_.path() / "log.txt"};
     const auto ended = run_processes({&command, 1}, 1, [](std::size_t /*done*/) { return true; });
@@ -118,12 +118,10 @@ class SuiteRuns : public testing::Test {
     }
   }
 
-  static std::unique_ptr<tests::TemporaryDirectory> folder_;
-  static Calibration calibration_;
+  static inline std::unique_ptr<tests::TemporaryDirectory> folder_;
+  static inline Calibration calibration_;
   tests::TemporaryDirectory scratch_;
 };
-std::unique_ptr<tests::TemporaryDirectory> SuiteRuns::folder_;
-Calibration SuiteRuns::calibration_;
 
 TEST_F(SuiteRuns, Tum) {
   fs::create_directories(data() / "deep");
