@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,6 +17,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/cpu_time.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
@@ -32,13 +32,8 @@ namespace {
 
 constexpr double kMillisecondsPerSecond = 1e3;
 
-/// CPU time of this thread [ms]: what other processes do meanwhile does not count.
 double cpu_ms() {
-  constexpr double kNanosecondsPerMillisecond = 1e6;
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * kMillisecondsPerSecond +
-         static_cast<double>(now.tv_nsec) / kNanosecondsPerMillisecond;
+  return kMillisecondsPerSecond * thread_cpu_s();
 }
 
 /// The value below which the part `p` of the values lie.

@@ -78,7 +78,7 @@ struct TableCommand::Job {
 std::string_view TableCommand::examples() {
   return "  geoflow bench table --suite tum --data ~/tum\n"
          "      every TUM RGB-D sequence below ~/tum in every row, on all cores\n"
-         "  geoflow bench table --suite scannet --data ~/scannet --rows r+o,r+o+i --jobs 4\n"
+         "  geoflow bench table --suite scannet --data ~/scannet --rows r+o,r+o+i+d --jobs 4\n"
          "      two rows of ScanNet's .sens files, four at a time\n"
          "  geoflow bench table --suite tum --data ~/tum --list | parallel\n"
          "      the same commands through GNU parallel, or line N in task N of a Slurm array\n"
@@ -96,8 +96,7 @@ void TableCommand::declare(CLI::App& command) {
   command.add_option("--data", data_, "Folder with its sequences, at any depth")->required();
   command.add_option("-o,--output", output_,
                      "Folder for results (default: out/table-SUITE); each run has SEQUENCE/ROW");
-  command
-      .add_option("--rows", rows_, "Only these rows, by commas: r, r+o, r+i, r+d, r+o+i, r+o+i+d")
+  command.add_option("--rows", rows_, "Only these rows, by commas: r, r+o, r+i, r+d, r+o+i+d")
       ->delimiter(',')
       ->allow_extra_args(false);
   command

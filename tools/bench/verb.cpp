@@ -1,5 +1,6 @@
 #include "geoflow/tools/verb.hpp"
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,10 +16,12 @@
 #include "geoflow/tools/bench/replay_benchmark.hpp"
 #include "geoflow/tools/bench/table.hpp"
 #include "geoflow/tools/console.hpp"
+#include "geoflow/tools/interrupt.hpp"
 
 #include "bench/clients_benchmark.hpp"
 #include "bench/gicp_benchmark.hpp"
 #include "bench/gicp_table.hpp"
+#include "bench/simulate_benchmark.hpp"
 #include "bench/table_command.hpp"
 
 namespace geoflow::tools {
@@ -26,6 +29,7 @@ namespace {
 
 constexpr int kMaxRuns = 1000;
 constexpr int kMaxPairs = 100'000;
+constexpr int kMaxFrames = 100'000;
 
 constexpr std::string_view kExamples =
     "  geoflow bench replay kitchen-400 --runs 5        frames a second, stage times and "
@@ -34,6 +38,7 @@ constexpr std::string_view kExamples =
     "  geoflow bench gicp kitchen-400 --pairs 100       registration of depth frames beside "
     "PCL's, times and errors\n"
     "  geoflow bench clients kitchen-400                the daemon alone and among 64 clients\n"
+    "  geoflow bench simulate                           how fast simulated places are made\n"
     "  geoflow bench table --suite tum --data ~/tum     accuracy on a data set, row by row\n"
     "  geoflow bench replay kitchen-400 --json          the same for scripts, with the "
     "machine\n"
@@ -63,16 +68,26 @@ class BenchVerb final : public Verb {
     clients_ = add(command, "clients", "Run the daemon alone and with 64 clients, some hostile");
     add_recording(*clients_);
     add_runs(*clients_);
+    simulate_ = add(command, "simulate", "Simulate places: frames a second, and what takes it");
+    simulate_
+        ->add_option("--scenes", simulated_.scenes,
+                     "Only these scenes, by commas (default: seven that differ)")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    simulate_->add_option("--frames", simulated_.frames, "Frames of each scene")
+        ->check(CLI::Range(kFewestBenchmarkFrames, kMaxFrames))
+        ->capture_default_str();
+    simulate_->add_flag("--csv", csv_, "Print CSV instead of a Markdown table");
     CLI::App* table = add(command, "table", "Run a whole data set in the paper's ablation rows");
     table->footer("Examples:\n" + std::string{TableCommand::examples()});
     table_.declare(*table);
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
-    if (!replay_->parsed() && !gicp_->parsed() && !clients_->parsed()) {
+    if (!replay_->parsed() && !gicp_->parsed() && !clients_->parsed() && !simulate_->parsed()) {
       return table_.run(console);
     }
-    return measure().map([&](const BenchTable& table) {
+    return measure(console).map([&](const BenchTable& table) {
       print(console, table);
       return ExitCode::kOk;
     });
@@ -99,7 +114,16 @@ class BenchVerb final : public Verb {
                          "Folder with Kalibr files (default: the recording's)");
   }
 
-  [[nodiscard]] Result<BenchTable> measure() const {
+  [[nodiscard]] Result<BenchTable> measure(Console& console) const {
+    if (simulate_->parsed()) {
+      const InterruptScope interrupt;
+      auto table = run_simulate_benchmark(simulated_, [&](std::size_t done, std::size_t total) {
+        console.progress(done, total, "scenes");
+        return !InterruptScope::requested();
+      });
+      console.end_progress();
+      return table;
+    }
     if (gicp_->parsed()) {
       GicpBenchmarkOptions options{.recording = recording_, .pairs = pairs_};
       if (!reference_.empty()) {
@@ -136,6 +160,8 @@ class BenchVerb final : public Verb {
   CLI::App* replay_ = nullptr;
   CLI::App* gicp_ = nullptr;
   CLI::App* clients_ = nullptr;
+  CLI::App* simulate_ = nullptr;
+  SimulateBenchmarkOptions simulated_;
   TableCommand table_;
   std::string recording_;
   std::string calibration_;

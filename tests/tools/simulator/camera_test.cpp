@@ -246,7 +246,7 @@ TEST(RayScene, LimbsKeepTheirThicknessWhileTheyMove) {
   const auto rays = RayScene::create(scene).value();
   const Pedestrian& person = scene.pedestrians.front();
   for (double t_s = 0; t_s < 1.5; t_s += 0.01) {
-    rays->move_people(t_s, t_s + kInterval_s);
+    rays->people().move(t_s, t_s + kInterval_s);
     const auto begin = person.body(t_s);
     const auto end = person.body(t_s + kInterval_s);
     for (const std::size_t shin : {1U, 7U}) {

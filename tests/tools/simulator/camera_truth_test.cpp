@@ -173,7 +173,7 @@ class StereoPair {
 
   DepthImage measure(double t_s, const SE3& T_world_cam) {
     const CameraIntrinsics k = d435i_ir_intrinsics(options_.width, options_.height);
-    rays_->move_people(t_s, t_s);
+    rays_->people().move(t_s, t_s);
     shader_.move_people(t_s);
     const InfraredView seen = see_infrared(*rays_, shader_, k, T_world_cam * d435i_T_cam_ir(), t_s,
                                            static_cast<float>(options_.projector_power));

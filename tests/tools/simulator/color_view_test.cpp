@@ -46,7 +46,7 @@ TEST_P(SteadyTilesOf, AnExposureSeesWhatTracingEveryRaySees) {
   // A rounding error in where a ray ends decides what is seen at an edge in a mirror: without them.
   const Scene scene = make_scene(GetParam(), 3, {.reflectivity = 0}).value();
   const auto rays = RayScene::create(scene).value();
-  rays->move_people(kShutter.begin_s(), kShutter.end_s());
+  rays->people().move(kShutter.begin_s(), kShutter.end_s());
   const Lighting lighting{scene, *rays};
   Shader shader{scene, *rays, lighting};
   shader.move_people(kShutter.t_mid_s);

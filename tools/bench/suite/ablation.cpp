@@ -20,7 +20,7 @@ constexpr std::array<Switch, 3> kSwitches = {
     {{.letter = 'o', .key = "slam.switches.optical_flow"},
      {.letter = 'i', .key = "slam.switches.gicp"},
      {.letter = 'd', .key = "slam.switches.depth_to_map"}}};
-constexpr std::array<std::string_view, 6> kRows = {"r", "r+o", "r+i", "r+d", "r+o+i", "r+o+i+d"};
+constexpr std::array<std::string_view, 5> kRows = {"r", "r+o", "r+i", "r+d", "r+o+i+d"};
 
 }  // namespace
 

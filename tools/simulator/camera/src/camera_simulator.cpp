@@ -12,6 +12,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/cpu_time.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
@@ -252,17 +253,20 @@ struct CameraSimulator::Parts {
   }
 
   /// Depth as measured, in whole millimetres, registered to colour.
-  [[nodiscard]] FrameRef measure_depth(double t_s, const PoseAt& T_world_cam,
-                                       std::uint64_t key) const {
+  [[nodiscard]] FrameRef measure_depth(double t_s, const PoseAt& T_world_cam, std::uint64_t key,
+                                       RenderCost& cost) const {
+    const double begin_s = thread_cpu_s();
     const SE3 T_world_ir = T_world_cam(t_s) * registration.T_cam_ir;
     const InfraredView seen = see_infrared(*rays, shader, registration.depth, T_world_ir, t_s,
                                            static_cast<float>(options.projector_power));
+    cost.light_s = thread_cpu_s() - begin_s;
     const std::vector<float> depth_m = match_stereo(seen, registration.depth, options, key);
     FrameRef depth = FramePool{1}.acquire(
         {.width = options.width, .height = options.height, .format = PixelFormat::kDepth16});
     std::vector<std::uint16_t> millimetres(depth_m.size());
     align_to_color(depth_m, registration, millimetres);
     std::ranges::copy(std::as_bytes(std::span{millimetres}), depth.writable_bytes().begin());
+    cost.sensor_s = thread_cpu_s() - begin_s - cost.light_s;
     return depth;
   }
 
@@ -299,11 +303,14 @@ Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_in
 
   // The longest exposure, whatever will be chosen, and depth's moment.
   const double half_s = 0.5 * (options.exposure_max_s + options.readout_s);
-  parts.rays->move_people(std::min(t_mid_exposure_s - half_s, t_depth_s),
-                          std::max(t_mid_exposure_s + half_s, t_depth_s));
+  parts.rays->people().move(std::min(t_mid_exposure_s - half_s, t_depth_s),
+                            std::max(t_mid_exposure_s + half_s, t_depth_s));
   parts.shader.move_people(t_mid_exposure_s);
   Rendered rendered;
+  RenderCost color_cost;
+  RenderCost depth_cost;
   const auto see_color = [&] {
+    const double begin_s = thread_cpu_s();
     const Exposure exposure = parts.meter(t_mid_exposure_s, T_world_cam);
     const Shutter shutter{.t_mid_s = t_mid_exposure_s,
                           .exposure_s = exposure.exposure_s,
@@ -312,19 +319,23 @@ Rendered CameraSimulator::render(double t_mid_exposure_s, std::uint64_t frame_in
     const std::vector<Rgb> light =
         expose(parts.subject(), parts.registration.color, shutter, T_world_cam,
                {.rays_a_pixel = options.subexposures, .key = subkey(key, "rays")});
+    color_cost.light_s = thread_cpu_s() - begin_s;
     rendered.color = develop(light, exposure, options, subkey(key, "sensor"));
+    color_cost.sensor_s = thread_cpu_s() - begin_s - color_cost.light_s;
     rendered.exposure_s = exposure.exposure_s;
     rendered.gain = exposure.gain;
   };
   const auto see_depth = [&] {
-    rendered.depth = parts.measure_depth(t_depth_s, T_world_cam, subkey(key, "stereo"));
+    rendered.depth = parts.measure_depth(t_depth_s, T_world_cam, subkey(key, "stereo"), depth_cost);
     if (options.depth_truth) {
       rendered.depth_truth =
           true_depth(*parts.rays, parts.registration.color, T_world_cam(t_mid_exposure_s),
-                     parts.rays->ray_time(t_mid_exposure_s));
+                     parts.rays->people().ray_time(t_mid_exposure_s));
     }
   };
   tbb::parallel_invoke(see_color, see_depth);
+  rendered.cost = {.light_s = color_cost.light_s + depth_cost.light_s,
+                   .sensor_s = color_cost.sensor_s + depth_cost.sensor_s};
   return rendered;
 }
 

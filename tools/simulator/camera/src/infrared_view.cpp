@@ -52,7 +52,7 @@ InfraredView see_infrared(const RayScene& rays, const Shader& shader,
   const Pinhole pinhole{intrinsics};
   const auto width = static_cast<std::size_t>(intrinsics.width);
   const float sun_lux = shader.sun_lux();
-  const float ray_time = rays.ray_time(t_s);
+  const float ray_time = rays.people().ray_time(t_s);
   const SteadyTiles steady{rays, pinhole, Shutter{.t_mid_s = t_s, .rows = intrinsics.height},
                            intrinsics.width,
                            ViewTrack{t_s, t_s, [&](double) { return T_world_ir; }}};

@@ -1,7 +1,6 @@
 #include "src/ray_scene.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +14,6 @@
 #include <embree3/rtcore.h>
 
 #include "geoflow/hal/result.hpp"
-#include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
 
 #include "src/candidates.hpp"
@@ -69,8 +67,8 @@ void write_capsule(const Capsule& capsule, const Vector3f& away, float* out) {
   }
 }
 
-float* new_corners(RTCGeometry geometry, unsigned slot, std::size_t count) {
-  return static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, slot,
+float* new_corners(RTCGeometry geometry, std::size_t count) {
+  return static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                      RTC_FORMAT_FLOAT3, 3 * sizeof(float), count));
 }
 
@@ -94,12 +92,6 @@ void set_facets(RTCGeometry geometry, std::size_t capsules) {
   }
 }
 
-/// A box about a ball, with room for rounding.
-Eigen::AlignedBox3f around(const Vector3f& centre, float radius_m) {
-  const Vector3f half = Vector3f::Constant(radius_m + kNear_m);
-  return {centre - half, centre + half};
-}
-
 void attach(RTCScene scene, RTCGeometry geometry, HitKind kind) {
   rtcCommitGeometry(geometry);
   rtcAttachGeometryByID(scene, geometry, static_cast<unsigned>(kind));
@@ -113,25 +105,6 @@ void intersect(RTCScene scene, const Valid& valid, RayPacket& packet) {
   constexpr std::size_t kVectorBytes = 64;
   alignas(kVectorBytes) const Valid aligned = valid;
   rtcIntersect16(aligned.data(), scene, &context, &packet);
-}
-
-/// Part of a ray, by its distance.
-struct Stretch {
-  float enters;
-  float leaves;
-};
-
-/// Between two planes across one axis: of a ray from there, that goes so far along it.
-[[gnu::always_inline]] inline Stretch crossing(float from, float along, float low, float high) {
-  const float inverse = 1.0F / along;
-  const float to_low = (low - from) * inverse;
-  const float to_high = (high - from) * inverse;
-  return {.enters = std::min(to_low, to_high), .leaves = std::max(to_low, to_high)};
-}
-
-/// What both have; `b` counts for nothing where it is not a number.
-[[gnu::always_inline]] inline Stretch common(const Stretch& a, const Stretch& b) {
-  return {.enters = std::max(a.enters, b.enters), .leaves = std::min(a.leaves, b.leaves)};
 }
 
 }  // namespace
@@ -151,7 +124,6 @@ Result<std::unique_ptr<RayScene>> RayScene::create(const Scene& scene) {
   made->add_patches();
   made->add_capsules();
   rtcCommitScene(made->standing_.get());
-  made->add_people();
   const RTCError error = rtcGetDeviceError(made->device_.get());
   if (error != RTC_ERROR_NONE) {
     return fail(ErrorCode::kSystem, "Embree refuses the scene {} (error {})", scene.name,
@@ -163,7 +135,7 @@ Result<std::unique_ptr<RayScene>> RayScene::create(const Scene& scene) {
 void RayScene::add_patches() {
   const std::vector<Patch>& patches = scene_->patches;
   const Owned<RTCGeometry> geometry{rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD)};
-  float* vertices = new_corners(geometry.get(), 0, 4 * patches.size());
+  float* vertices = new_corners(geometry.get(), 4 * patches.size());
   unsigned* indices = new_quads(geometry.get(), patches.size());
   unsigned next = 0;
   for (const Patch& patch : patches) {
@@ -182,7 +154,7 @@ void RayScene::add_capsules() {
     return;
   }
   const Owned<RTCGeometry> geometry{rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD)};
-  float* vertices = new_corners(geometry.get(), 0, kCorners * capsules.size());
+  float* vertices = new_corners(geometry.get(), kCorners * capsules.size());
   for (std::size_t i = 0; i < capsules.size(); ++i) {
     write_capsule(capsules[i], away_from(capsules[i]), vertices + 3 * kCorners * i);
   }
@@ -190,78 +162,10 @@ void RayScene::add_capsules() {
   attach(standing_.get(), geometry.get(), HitKind::kCapsule);
 }
 
-void RayScene::add_people() {
-  const std::size_t count = scene_->pedestrians.size() * Pedestrian::kCapsules;
-  if (count == 0) {
-    return;
-  }
-  walking_.reset(rtcNewScene(device_.get()));
-  rtcSetSceneFlags(walking_.get(),
-                   static_cast<RTCSceneFlags>(static_cast<unsigned>(RTC_SCENE_FLAG_DYNAMIC) |
-                                              static_cast<unsigned>(RTC_SCENE_FLAG_ROBUST)));
-  people_.reset(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD));
-  rtcSetGeometryTimeStepCount(people_.get(), 2);
-  people_begin_.resize(count);
-  people_vertices_ = {new_corners(people_.get(), 0, kCorners * count),
-                      new_corners(people_.get(), 1, kCorners * count)};
-  set_facets(people_.get(), count);
-  attach(walking_.get(), people_.get(), HitKind::kPerson);
-  move_people(0, 0);
-}
-
-void RayScene::move_people(double begin_s, double end_s) {
-  if (!people_) {
-    return;
-  }
-  people_begin_s_ = begin_s;
-  people_end_s_ = end_s;
-  people_travel_m_ = 0;
-  people_boxes_.clear();
-  std::size_t next = 0;
-  for (const Pedestrian& person : scene_->pedestrians) {
-    const auto begin = person.body(begin_s);
-    const auto end = person.body(end_s);
-    // Corners move straight from one place to the other.
-    Eigen::AlignedBox3f box;
-    for (const auto& body : {begin, end}) {
-      for (const Capsule& capsule : body) {
-        box.extend(around(capsule.start, capsule.start_radius_m));
-        box.extend(around(capsule.end, capsule.end_radius_m));
-      }
-    }
-    people_boxes_.push_back({.low_m = {box.min().x(), box.min().y(), box.min().z()},
-                             .high_m = {box.max().x(), box.max().y(), box.max().z()}});
-    for (std::size_t i = 0; i < begin.size(); ++i, ++next) {
-      // Corners of both are counted alike: else a limb between the two would be wrung out thin.
-      const Vector3f away = away_from(begin[i]);
-      write_capsule(begin[i], away, people_vertices_[0] + 3 * kCorners * next);
-      write_capsule(end[i], away, people_vertices_[1] + 3 * kCorners * next);
-      people_begin_[next] = begin[i];
-      people_travel_m_ = std::max({people_travel_m_, (end[i].start - begin[i].start).norm(),
-                                   (end[i].end - begin[i].end).norm()});
-    }
-  }
-  rtcUpdateGeometryBuffer(people_.get(), RTC_BUFFER_TYPE_VERTEX, 0);
-  rtcUpdateGeometryBuffer(people_.get(), RTC_BUFFER_TYPE_VERTEX, 1);
-  rtcCommitGeometry(people_.get());
-  rtcCommitScene(walking_.get());
-}
-
-float RayScene::ray_time(double t_s) const noexcept {
-  const double span_s = people_end_s_ - people_begin_s_;
-  return span_s > 0 ? static_cast<float>(std::clamp((t_s - people_begin_s_) / span_s, 0.0, 1.0))
-                    : 0.0F;
-}
-
-float RayScene::people_travel_m(double duration_s) const noexcept {
-  const double span_s = people_end_s_ - people_begin_s_;
-  return span_s > 0 ? people_travel_m_ * static_cast<float>(duration_s / span_s) : 0.0F;
-}
-
 std::size_t RayScene::primitive(const RayPacket& packet, std::size_t lane) {
   const std::size_t number = packet.hit.primID[lane];
-  return packet.hit.geomID[lane] == static_cast<unsigned>(HitKind::kPatch) ? number
-                                                                           : number / kFacets;
+  return packet.hit.geomID[lane] == static_cast<unsigned>(HitKind::kCapsule) ? number / kFacets
+                                                                             : number;
 }
 
 void RayScene::reset(RayPacket& packet) {
@@ -283,39 +187,7 @@ void RayScene::renew(RayPacket& packet) {
 
 void RayScene::trace(const Valid& valid, RayPacket& packet) const {
   intersect(standing_.get(), valid, packet);
-  meet_people(valid, packet);
-}
-
-void RayScene::meet_people(const Valid& valid, RayPacket& packet) const {
-  if (!walking_) {
-    return;
-  }
-  const Valid near = near_people(valid, packet);
-  if (std::ranges::find(near, -1) != near.end()) {
-    intersect(walking_.get(), near, packet);
-  }
-}
-
-Valid RayScene::near_people(const Valid& valid, const RayPacket& packet) const {
-  Valid near{};
-  with_wide_vectors([&]() __attribute__((always_inline)) {
-    // Copies: GCC makes no vectors of what it loads through a constant reference in here.
-    const RTCRay16 ray = packet.ray;
-    const Valid counts = valid;
-    std::array<int, kPacket> found{};
-    for (const Box& box : people_boxes_) {
-      for (std::size_t i = 0; i < kPacket; ++i) {
-        const Stretch whole{.enters = ray.tnear[i], .leaves = ray.tfar[i]};
-        const Stretch x = crossing(ray.org_x[i], ray.dir_x[i], box.low_m[0], box.high_m[0]);
-        const Stretch y = crossing(ray.org_y[i], ray.dir_y[i], box.low_m[1], box.high_m[1]);
-        const Stretch z = crossing(ray.org_z[i], ray.dir_z[i], box.low_m[2], box.high_m[2]);
-        const Stretch met = common(common(common(whole, x), y), z);
-        found[i] |= met.enters <= met.leaves ? counts[i] : 0;
-      }
-    }
-    near = found;
-  });
-  return near;
+  people_.stop(valid, packet);
 }
 
 void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
@@ -331,7 +203,7 @@ void RayScene::trace_among(const Candidates& candidates, const Valid& valid,
     trace_gaps(valid, packet);
   }
   if (candidates.people()) {
-    meet_people(valid, packet);
+    people_.stop(valid, packet);
   }
 }
 

@@ -14,6 +14,7 @@
 
 #include "src/candidates.hpp"
 #include "src/flat.hpp"
+#include "src/people.hpp"
 
 namespace geoflow::simulator {
 
@@ -29,15 +30,10 @@ class RayScene {
  public:
   [[nodiscard]] static Result<std::unique_ptr<RayScene>> create(const Scene& scene);
 
-  /// From here on, rays see the people walk from where they are at begin_s to where they are at
-  /// end_s.
-  void move_people(double begin_s, double end_s);
-  /// The ray time of a moment; 0 … 1 within what the people were moved to, and never beyond.
-  [[nodiscard]] float ray_time(double t_s) const noexcept;
-  /// How far any part of the people moves from begin_s to end_s, at most [m]; or during a part of
-  /// it.
-  [[nodiscard]] float people_travel_m() const noexcept { return people_travel_m_; }
-  [[nodiscard]] float people_travel_m(double duration_s) const noexcept;
+  /// Whom rays meet besides what stands still; moving them is for the thread that no ray is traced
+  /// in meanwhile.
+  [[nodiscard]] People& people() noexcept { return people_; }
+  [[nodiscard]] const People& people() const noexcept { return people_; }
 
   /// Sets a packet's members that all rays share: no hit yet, time 0, from 1 mm on to infinity.
   static void reset(RayPacket& packet);
@@ -57,10 +53,6 @@ class RayScene {
   [[nodiscard]] static std::size_t primitive(const RayPacket& packet, std::size_t lane);
 
   [[nodiscard]] const Scene& scene() const noexcept { return *scene_; }
-  /// A person's capsule at time 0 of the interval, by that number.
-  [[nodiscard]] const Capsule& person_capsule(std::size_t primitive) const {
-    return people_begin_[primitive];
-  }
 
  private:
   struct Release {
@@ -72,33 +64,18 @@ class RayScene {
   using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
   explicit RayScene(const Scene& scene)
-      : scene_{&scene}, flats_(scene.patches.begin(), scene.patches.end()) {}
+      : scene_{&scene}, flats_(scene.patches.begin(), scene.patches.end()), people_{scene} {}
   void add_patches();
   void add_capsules();
   void add_people();
-  /// Lets those of the rays that come near a person end on them.
-  void meet_people(const Valid& valid, RayPacket& packet) const;
   /// Traces what has met no patch yet: between two that touch, rounding may let a ray through.
   void trace_gaps(const Valid& valid, RayPacket& packet) const;
-  [[nodiscard]] Valid near_people(const Valid& valid, const RayPacket& packet) const;
 
   const Scene* scene_;
   std::vector<Flat> flats_;  ///< of the patches
   Owned<RTCDevice> device_;
   Owned<RTCScene> standing_;
-  Owned<RTCScene> walking_;  ///< the people; null if there are none
-  Owned<RTCGeometry> people_;
-  double people_begin_s_ = 0;
-  double people_end_s_ = 0;
-  float people_travel_m_ = 0;  ///< between the two
-  /// What a person stays within while they are moved.
-  struct Box {
-    std::array<float, 3> low_m;
-    std::array<float, 3> high_m;
-  };
-  std::vector<Capsule> people_begin_;
-  std::vector<Box> people_boxes_;
-  std::array<float*, 2> people_vertices_{};  ///< Embree's buffers for ray time 0 and 1
+  People people_;
 };
 
 }  // namespace geoflow::simulator

@@ -32,7 +32,7 @@ struct Projection {
     float y;
     float depth_m;
   };
-  [[gnu::always_inline]] inline Place project(float x, float y, float depth_m) const {
+  [[nodiscard, gnu::always_inline]] Place project(float x, float y, float depth_m) const {
     const float along_x = depth_m * ((x - pinhole.cx) * pinhole.inverse_fx);
     const float along_y = depth_m * ((y - pinhole.cy) * pinhole.inverse_fy);
     const auto axis = [&](int i) __attribute__((always_inline)) {
@@ -64,42 +64,59 @@ struct Covered {
 Covered cover(const Projection& projection, const CameraIntrinsics& color, const Lanes& depths_m,
               int x, int y) {
   constexpr float kNearest_m = 0.01F;
-  constexpr auto kLargest = static_cast<float>(std::numeric_limits<std::uint16_t>::max());
+  constexpr int kLargest_mm = std::numeric_limits<std::uint16_t>::max();
   Covered covered;
   with_wide_vectors([&]() __attribute__((always_inline)) {
+    // Copies: GCC makes no vectors of what it loads through a constant reference in here.
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
     const Projection to_color = projection;
+    const Lanes all_m = depths_m;
+    Covered found;
     const int width = color.width;
     const int height = color.height;
     const auto row = static_cast<float>(y);
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const float depth_m = depths_m[i];
+      const float depth_m = all_m[i];
       const auto column = static_cast<float>(x + static_cast<int>(i));
       const float centre_m = to_color.project(column, row, depth_m).depth_m;
-      const float rounded = held(kMillimetres * centre_m + 0.5F, 0.0F, kLargest + 1.0F);
+      const float rounded =
+          held(kMillimetres * centre_m + 0.5F, 0.0F, static_cast<float>(kLargest_mm + 1));
+      // One choice after the other: GCC makes no vectors of a choice between truths.
       const auto millimetres = static_cast<int>(rounded);
-      const bool seen = depth_m > 0.0F && centre_m >= kNearest_m && rounded < kLargest + 1.0F;
-      covered.depth_mm[i] = seen ? millimetres : 0;
+      const int held_mm = millimetres <= kLargest_mm ? millimetres : 0;
+      const int far_mm = centre_m >= kNearest_m ? held_mm : 0;
+      found.depth_mm[i] = depth_m > 0.0F ? far_mm : 0;
       const auto low = to_color.project(column - 0.5F, row - 0.5F, depth_m);
       const auto high = to_color.project(column + 0.5F, row + 0.5F, depth_m);
-      covered.left[i] = std::max(0, pixel_at(low.x, width));
-      covered.top[i] = std::max(0, pixel_at(low.y, height));
-      covered.right[i] = std::min(width - 1, pixel_at(high.x, width));
-      covered.bottom[i] = std::min(height - 1, pixel_at(high.y, height));
+      found.left[i] = std::max(0, pixel_at(low.x, width));
+      found.top[i] = std::max(0, pixel_at(low.y, height));
+      found.right[i] = std::min(width - 1, pixel_at(high.x, width));
+      found.bottom[i] = std::min(height - 1, pixel_at(high.y, height));
     }
+    covered = found;
   });
   return covered;
 }
 
-/// Leaves in each pixel that lane `i` covers the nearest depth; 0 is none.
-void fill_nearest(const Covered& covered, std::size_t i, int width,
+/// Leaves in each pixel that a lane covers the nearest depth; 0 is none.
+void fill_nearest(const Covered& covered, std::size_t lane, int width,
                   std::span<std::uint16_t> out_mm) {
-  const auto depth_mm = static_cast<std::uint16_t>(covered.depth_mm[i]);
-  for (int row = covered.top[i]; row <= covered.bottom[i]; ++row) {
-    for (int column = covered.left[i]; column <= covered.right[i]; ++column) {
+  const auto depth_mm = static_cast<std::uint16_t>(covered.depth_mm[lane]);
+  for (int row = covered.top[lane]; row <= covered.bottom[lane]; ++row) {
+    for (int column = covered.left[lane]; column <= covered.right[lane]; ++column) {
       std::uint16_t& pixel =
           out_mm[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                  static_cast<std::size_t>(column)];
       pixel = pixel == 0 ? depth_mm : std::min(pixel, depth_mm);
+    }
+  }
+}
+
+/// The same for all lanes.
+void fill_nearest(const Covered& covered, int width, std::span<std::uint16_t> out_mm) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (covered.depth_mm[lane] != 0) {
+      fill_nearest(covered, lane, width, out_mm);
     }
   }
 }
@@ -122,12 +139,7 @@ void align_to_color(const std::vector<float>& depth_m, const Registration& regis
     for (std::size_t x = 0; x < width; x += kLanes) {
       Lanes depths_m{};
       std::ranges::copy(row.subspan(x, std::min(kLanes, width - x)), depths_m.begin());
-      const Covered covered = cover(projection, color, depths_m, static_cast<int>(x), y);
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        if (covered.depth_mm[i] != 0) {
-          fill_nearest(covered, i, color.width, out_mm);
-        }
-      }
+      fill_nearest(cover(projection, color, depths_m, static_cast<int>(x), y), color.width, out_mm);
     }
   }
 }

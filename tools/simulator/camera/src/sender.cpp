@@ -45,8 +45,8 @@ Sender::Sender(const RayScene& rays, const Pinhole& pinhole, const Shutter& shut
       shutter_{shutter},
       track_{&track},
       sampling_{sampling},
-      ray_time_begin_{rays.ray_time(shutter.begin_s())},
-      ray_time_per_s_{(rays.ray_time(shutter.end_s()) - ray_time_begin_) /
+      ray_time_begin_{rays.people().ray_time(shutter.begin_s())},
+      ray_time_per_s_{(rays.people().ray_time(shutter.end_s()) - ray_time_begin_) /
                       static_cast<float>(shutter.end_s() - shutter.begin_s())} {}
 
 std::vector<Sender::Leg> Sender::legs(int top) const {

@@ -228,7 +228,8 @@ void Shader::look_at_round(std::size_t lane, const RayPacket& packet, Surfaces& 
   const Vector3f direction = direction_of(packet, lane);
   const std::size_t primitive = RayScene::primitive(packet, lane);
   const bool person = packet.hit.geomID[lane] == static_cast<unsigned>(HitKind::kPerson);
-  const Capsule& capsule = person ? rays_->person_capsule(primitive) : scene_->capsules[primitive];
+  const Capsule& capsule =
+      person ? rays_->people().limbs()[primitive] : scene_->capsules[primitive];
   const Material& material = scene_->materials[static_cast<std::size_t>(capsule.material)];
   Vector3f normal =
       Vector3f{packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]}.normalized();

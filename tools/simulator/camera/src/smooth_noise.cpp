@@ -54,6 +54,24 @@ SmoothNoise::SmoothNoise(std::uint64_t key, int width, int height, float pitch_x
   }
 }
 
+Lanes SmoothNoise::along_row(const Across& across, const float* nodes, float scale) {
+  Lanes field{};
+  with_wide_vectors([&]() __attribute__((always_inline)) {
+    // A copy: GCC makes no vectors of what it loads through a constant reference in here.
+    const Across places = across;
+    Lanes sum{};
+    for (std::size_t k = 0; k < places.weight.size(); ++k) {
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        sum[i] += places.weight[k][i] * nodes[places.first[i] + k];
+      }
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      field[i] = sum[i] * places.scale[i] * scale;
+    }
+  });
+  return field;
+}
+
 void SmoothNoise::row(int y, std::vector<float>& out) const {
   const Weights down = weights(static_cast<float>(y) / pitch_y_);
   std::vector<float> blended(columns_);
@@ -64,19 +82,7 @@ void SmoothNoise::row(int y, std::vector<float>& out) const {
   }
   out.resize(width_);
   for (std::size_t x = 0; x < width_; x += kLanes) {
-    const Across& across = across_[x / kLanes];
-    Lanes field;
-    with_wide_vectors([&]() __attribute__((always_inline)) {
-      const float* const nodes = blended.data();
-      const float scale = down.scale;
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        float sum = 0;
-        for (std::size_t k = 0; k < across.weight.size(); ++k) {
-          sum += across.weight[k][i] * nodes[across.first[i] + k];
-        }
-        field[i] = sum * across.scale[i] * scale;
-      }
-    });
+    const Lanes field = along_row(across_[x / kLanes], blended.data(), down.scale);
     std::copy_n(field.begin(), std::min(kLanes, width_ - x),
                 out.begin() + static_cast<std::ptrdiff_t>(x));
   }

@@ -36,6 +36,8 @@ class SmoothNoise {
     std::array<Lanes, 4> weight{};
     Lanes scale{};
   };
+  /// The field of those pixels from a row of nodes, which is weighted down already.
+  [[nodiscard]] static Lanes along_row(const Across& across, const float* nodes, float scale);
 
   std::size_t width_;
   float pitch_y_;

@@ -38,7 +38,7 @@ SteadyTiles::SteadyTiles(const RayScene& rays, const Pinhole& pinhole, const Shu
     : columns_{(width + kTile - 1) / kTile},
       rows_{(shutter.rows + kTile - 1) / kTile},
       pinhole_{pinhole},
-      walk_m_{rays.people_travel_m(0.5 * shutter.exposure_s)},
+      walk_m_{rays.people().travel_m(0.5 * shutter.exposure_s)},
       moves_{shutter.exposure_s > 0},
       anything_{columns_ + 1, rows_ + 1},
       anyone_{columns_ + 1, rows_ + 1},
@@ -149,8 +149,8 @@ void SteadyTiles::add_outlines(const RayScene& rays) {
 void SteadyTiles::add_people(const RayScene& rays) {
   const Outlines outlines{pinhole_, middles_, columns_};
   std::vector<Outlines::Crossing> crossings;
-  for (std::size_t i = 0; i < rays.scene().pedestrians.size() * Pedestrian::kCapsules; ++i) {
-    outlines.of(rays.person_capsule(i), rays.people_travel_m(), crossings);
+  for (const Capsule& limb : rays.people().limbs()) {
+    outlines.of(limb, rays.people().travel_m(), crossings);
     for (const auto& [tile, depth_m] : crossings) {
       if (depth_m <= kBehind * depths_[tile].farthest_m) {
         people_[tile].add(depth_m);

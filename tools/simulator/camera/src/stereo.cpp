@@ -58,6 +58,13 @@ std::vector<float> true_disparity(const InfraredView& seen, float focal_baseline
   return -kSteepness * kRipple_px * beyond_half * (1.0F - 2.0F * std::abs(beyond_half));
 }
 
+/// 0 where `value` is beyond either bound. One choice after the other: GCC makes no vectors of a
+/// choice between truths.
+[[gnu::always_inline]] inline float zero_beyond(float value, float low, float high) noexcept {
+  const float not_above = value <= high ? value : 0.0F;
+  return value >= low ? not_above : 0.0F;
+}
+
 /// One row's worth of what is random.
 struct RandomRow {
   std::vector<float> noise;
@@ -154,7 +161,9 @@ class Matcher {
   [[nodiscard]] Lanes measure(const Stretch& stretch) const {
     Lanes depth_m;
     with_wide_vectors([&]() __attribute__((always_inline)) {
-      const Lanes found = beside_edges(stretch, options_->depth_errors ? kRagged_px : 0.0F,
+      // Copies: GCC makes no vectors of what it loads through a constant reference in here.
+      const Stretch own = stretch;
+      const Lanes found = beside_edges(own, options_->depth_errors ? kRagged_px : 0.0F,
                                        options_->depth_errors ? kStep_px : kNever_px);
       const auto scale = static_cast<float>(options_->depth_noise_scale);
       const float spread = scale * static_cast<float>(options_->depth_subpixel_px);
@@ -165,16 +174,16 @@ class Matcher {
       const auto farthest_m = static_cast<float>(options_->depth_max_m);
       const float focal_baseline = focal_baseline_;
       for (std::size_t i = 0; i < kLanes; ++i) {
-        const float matched = found[i] + spread * spread_of(stretch.signal[i]) * stretch.noise[i] +
-                              calibration * stretch.calibration[i];
+        const float matched = found[i] + spread * spread_of(own.signal[i]) * own.noise[i] +
+                              calibration * own.calibration[i];
         const float noisy = matched + scale * ripple_of(matched);
         const float stepped =
             static_cast<float>(whole_below(kSubpixelSteps * noisy + 0.5F)) / kSubpixelSteps;
         const float disparity = rounds ? stepped : noisy;
         const float depth = focal_baseline / disparity;
-        const bool seen =
-            found[i] > 0.0F && disparity > 0.0F && depth >= nearest_m && depth <= farthest_m;
-        depth_m[i] = seen ? depth : 0.0F;
+        const float within = zero_beyond(depth, nearest_m, farthest_m);
+        const float positive = disparity > 0.0F ? within : 0.0F;
+        depth_m[i] = found[i] > 0.0F ? positive : 0.0F;
       }
     });
     return depth_m;
@@ -212,15 +221,16 @@ class Matcher {
       const float farther_above = std::min(over, under);
       const float farther = std::min(farther_aside, farther_above);
       const float farthest = std::min(here, farther);
-      // A slanted surface has a slope, a step is more than both its sides' slopes.
-      const bool step = nearest - farthest >= step_px && nearest + farthest - 2.0F * here != 0.0F;
       // Only an edge is ragged: a slanted surface is seen where it is.
       const float own = disparity_at(stretch.x + static_cast<int>(i), stretch.y);
-      const bool beyond_edge = std::abs(here - own) >= step_px;
+      const float shifted = std::abs(here - own) >= step_px ? here : own;
       const float between = farthest + (nearest - farthest) * stretch.between[i];
       const float beside = stretch.chance[i] < kBetween ? between : here;
       const float torn = stretch.chance[i] < kNothing ? 0.0F : beside;
-      found[i] = step ? torn : (beyond_edge ? here : own);
+      // A slanted surface has a slope, a step is more than both its sides' slopes. One choice after
+      // the other: GCC makes no vectors of a choice between truths.
+      const float steep = nearest - farthest >= step_px ? torn : shifted;
+      found[i] = nearest + farthest - 2.0F * here != 0.0F ? steep : shifted;
     }
     return found;
   }

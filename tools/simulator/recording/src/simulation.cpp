@@ -15,6 +15,7 @@
 #include <tl/expected.hpp>
 
 #include "geoflow/hal/calibration.hpp"
+#include "geoflow/hal/cpu_time.hpp"
 #include "geoflow/hal/geometry.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/result.hpp"
@@ -122,6 +123,8 @@ class Simulation::Implementation {
     return {.domain = options_.recording.device_clocks ? StampDomain::kDevice : StampDomain::kHost};
   }
 
+  [[nodiscard]] const SimulationCost& cost() const noexcept { return cost_; }
+
   [[nodiscard]] std::size_t frames() const {
     return sample_times(options_.recording.frame_rate_hz, options_.duration_s).size();
   }
@@ -136,7 +139,9 @@ class Simulation::Implementation {
           return false;
         }
       }
+      const double begin_s = thread_cpu_s();
       deliver(arrival, sinks);
+      cost_.delivery_s += thread_cpu_s() - begin_s;
     }
     return true;
   }
@@ -190,7 +195,9 @@ class Simulation::Implementation {
     const double t_s = frame_time(index);
     const SE3 T_base_cam = go2_T_base_cam();
     const auto T_world_cam = [&](double at_s) { return body(at_s).T_world_base * T_base_cam; };
-    rendered_[index] = camera_->render(t_s, index, T_world_cam);
+    const Rendered& images = rendered_[index] = camera_->render(t_s, index, T_world_cam);
+    cost_.render.light_s += images.cost.light_s;
+    cost_.render.sensor_s += images.cost.sensor_s;
     sinks.frame_truth({.t = host_time(t_s),
                        .T_world_base = body(t_s).T_world_base,
                        .T_world_cam = T_world_cam(t_s)});
@@ -270,6 +277,7 @@ class Simulation::Implementation {
   DeviceClockModel leg_clock_;
   std::map<std::size_t, Rendered> rendered_;  // whose images were not delivered yet
   std::size_t rendered_count_ = 0;
+  SimulationCost cost_;
 };
 
 Simulation::Simulation(std::unique_ptr<Implementation> implementation)
@@ -304,6 +312,9 @@ StampInfo Simulation::stamps() const noexcept {
 }
 std::size_t Simulation::frames() const noexcept {
   return implementation_->frames();
+}
+const SimulationCost& Simulation::cost() const noexcept {
+  return implementation_->cost();
 }
 Result<bool> Simulation::run(const SimulationSinks& sinks,
                              const std::function<bool(std::size_t)>& go_on) {

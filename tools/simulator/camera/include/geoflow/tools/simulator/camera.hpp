@@ -58,6 +58,13 @@ struct CameraOptions {
 /// The knobs of CameraOptions, "camera.…".
 [[nodiscard]] std::span<const Knob<CameraOptions>> camera_knobs();
 
+/// CPU time that a frame's steps took of the threads that began them [s]: all of it where the TBB
+/// arena has one thread.
+struct RenderCost {
+  double light_s = 0;   ///< what there is to see: rays traced, surfaces shaded
+  double sensor_s = 0;  ///< what the sensors make of it: noise, stereo matching, registration
+};
+
 /// One pair of images and what is true of them.
 struct Rendered {
   FrameRef color;
@@ -66,6 +73,7 @@ struct Rendered {
                                    ///< view at mid exposure; 0: sky; empty unless wanted
   double exposure_s = 0;
   double gain = 1;
+  RenderCost cost{};
 };
 
 /// Renders frames of one scene; the scene must outlive it. Frames may be rendered in any order: a
@@ -98,10 +106,10 @@ class CameraSimulator {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Lets the whole program keep the memory that it frees. A frame takes and frees some twenty
-/// megabytes: given back to the kernel, their pages are faulted in anew for the next one, which
-/// takes a third of the time to render it. For programs that render many, before they start
-/// threads.
+/// Lets the whole program keep the memory that it frees. A frame of 640 x 480 takes and frees some
+/// eleven megabytes: given back to the kernel, their pages are faulted in anew for the next one,
+/// which was measured to add 0.44 to the time that it takes (docs/benchmarks.md). For programs that
+/// render many, before they start threads.
 void keep_freed_memory() noexcept;
 
 /// Pose of the left infrared camera in the colour camera's frame, as calibrated on a D435i.

@@ -58,6 +58,13 @@ struct SimulationSinks {
   std::function<void(const FrameTruth&)> frame_truth;
 };
 
+/// CPU time of the thread that runs the simulation [s]: all of it where the TBB arena has one
+/// thread.
+struct SimulationCost {
+  RenderCost render{};
+  double delivery_s = 0;  ///< the sinks', and samples other than images
+};
+
 /// A robot that walks through a scene, as the samples that its sensors would deliver. Thread-bound;
 /// rendering uses the TBB arena that run() is called in.
 class Simulation {
@@ -78,6 +85,8 @@ class Simulation {
   [[nodiscard]] StampInfo stamps() const noexcept;
   /// Pairs of images that run() delivers.
   [[nodiscard]] std::size_t frames() const noexcept;
+  /// What run() has taken so far.
+  [[nodiscard]] const SimulationCost& cost() const noexcept;
 
   /// Delivers everything in order of arrival, once. `go_on` gets the number of rendered frames
   /// after each; false ends the run early. True when it came to its end.
