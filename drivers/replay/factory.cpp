@@ -31,7 +31,7 @@ struct Format {
 };
 
 constexpr std::array kFormats = {
-    Format{.description = "rosbag2 (metadata.yaml or .db3 files, sqlite3 storage)",
+    Format{.description = "rosbag2 (metadata.yaml, .db3 or .mcap files)",
            .looks_like = bag::looks_like,
            .open =
                [](const RecordingOptions& options) {

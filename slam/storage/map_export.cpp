@@ -67,6 +67,20 @@ Trajectory keyframe_poses(const StoredMap& map) {
   return poses;
 }
 
+std::vector<MapLoop> loops(const StoredMap& map) {
+  const SE3 T_cam_base = map.identity.calibration.T_base_cam.value_or(SE3{}).inverse();
+  const auto p_map_base = [&](KeyframeId id) -> Vector3d {
+    return (map.contents.keyframes.at(id).T_odom_cam * T_cam_base).translation();
+  };
+  std::vector<MapLoop> found;
+  for (const RelativeEdge& edge : map.contents.edges) {
+    if (edge.kind == EdgeKind::kLoop) {
+      found.push_back({.p_map_from = p_map_base(edge.from), .p_map_to = p_map_base(edge.to)});
+    }
+  }
+  return found;
+}
+
 std::vector<Vector3d> sparse_points(const StoredMap& map) {
   std::vector<Vector3d> points;
   points.reserve(map.contents.points.size());

@@ -46,13 +46,15 @@ LIBRARIES = (
     Library("Boost", r"boost/", ("Boost::headers",), ("timesync",)),
     Library("SQLite", r"sqlite3\.h", ("PkgConfig::SQLITE3", "SQLite::SQLite3"), ("drivers/replay",)),
     Library("zstd", r"zstd\.h", ("PkgConfig::ZSTD",), ("drivers/replay",)),
+    Library("lz4", r"lz4(frame)?\.h", ("PkgConfig::LZ4",), ("drivers/replay/bag",)),
     Library("zlib", r"z(lib|conf)\.h", ("ZLIB::ZLIB",),
-            ("drivers/replay/scannet", "drivers/d435i/monitor", "slam/storage")),
+            ("drivers/replay/bag", "drivers/replay/scannet", "drivers/d435i/monitor", "slam/storage")),
     Library("yaml-cpp", r"yaml-cpp/", ("yaml-cpp",), ("drivers/replay",)),
     Library("toml++", r"toml\+\+/", ("tomlplusplus::tomlplusplus",), ("daemon/config", "drivers/replay", "tools/calibrate")),
     Library("CLI11", r"CLI/", ("CLI11::CLI11",), ("daemon/src/command_line.cpp", "tools")),
     Library("nlohmann-json", r"nlohmann/", ("nlohmann_json::nlohmann_json",), ("daemon", "tools")),
     Library("cairo", r"cairo", ("PkgConfig::CAIRO",), ("tools/plot",)),
+    Library("libmicrohttpd", r"microhttpd\.h", ("PkgConfig::MICROHTTPD",), ("tools/view",)),
     Library("systemd", r"systemd/", ("PkgConfig::SYSTEMD",), ("daemon/service",)),
     Library("udev", r"libudev\.h", ("PkgConfig::UDEV",), ("drivers/usb",)),
     Library("libusb", r"libusb", ("PkgConfig::LIBUSB",), ("drivers/usb",)),
@@ -116,5 +118,9 @@ THREAD_FILES = (
     "tools/bench/client_load.hpp",
     "tools/bench/clients_benchmark.cpp",  # asks the daemon how it is while its end is waited for
     "tools/record/live_recorder.cpp",  # the source delivers on a thread of its own while this one writes
+    "tools/view/live_state.cpp",  # pages wait, on threads of their library, for what the follower puts
+    "tools/view/live_state.hpp",
+    "tools/view/map_scene.cpp",  # a page's thread reads the map that the follower names
+    "tools/view/map_scene.hpp",
     "tools/record/sample_queue.hpp",  # between the threads that bring samples and the one that writes them
 )

@@ -43,6 +43,7 @@ constexpr std::string_view kExamples =
     "  geoflow record --from kitchen-400 -o kitchen-bag          any recording becomes a "
     "bag\n"
     "  geoflow record --from openloris -o bag --compress         compressed with Zstandard\n"
+    "  geoflow record --from bag -o walk --mcap                  as MCAP, for Foxglove\n"
     "  geoflow record --from bag -o faulty --faults drops.yaml   with faults put on it\n"
     "  geoflow record --live --set source.camera=d435i -o walk   a camera, until Ctrl-C\n"
     "  geoflow record --live --config g.toml -o walk             what the daemon has\n"
@@ -60,11 +61,12 @@ struct RecordCounts {
 };
 
 drivers::BagWriterOptions writer_options(const daemon::Ports& ports, const std::string& output,
-                                         bool compress) {
+                                         bool compress, bool mcap) {
   drivers::BagWriterOptions options{.directory = output, .compress = compress};
   const auto stamps = [](const auto* port) {
     return port != nullptr ? port->stamps() : StampInfo{};
   };
+  options.storage = mcap ? drivers::BagStorage::kMcap : drivers::BagStorage::kSqlite;
   options.camera_stamps = stamps(ports.camera);
   options.imu_stamps = stamps(ports.imu);
   options.leg_stamps = stamps(ports.legs);
@@ -112,7 +114,8 @@ class RecordVerb final : public Verb {
                   "Colour as gray: a third of the bytes, and what the "
                   "estimator sees")
         ->needs(live);
-    command.add_flag("--compress", compress_, "Compress every message");
+    command.add_flag("--compress", compress_, "Compress every message, in MCAP every chunk");
+    command.add_flag("--mcap", mcap_, "MCAP storage, which Foxglove opens as it is; else SQLite");
   }
 
   [[nodiscard]] Result<ExitCode> run(Console& console) override {
@@ -133,7 +136,7 @@ class RecordVerb final : public Verb {
       return tl::unexpected{std::move(streams.error())};
     }
     daemon::Sources source{.streams = std::move(*streams)};
-    auto writer = BagWriter::create(writer_options(source.ports(), output_, compress_),
+    auto writer = BagWriter::create(writer_options(source.ports(), output_, compress_, mcap_),
                                     source.streams->calibration());
     if (!writer) {
       return tl::unexpected{std::move(writer.error())};
@@ -159,7 +162,7 @@ class RecordVerb final : public Verb {
     if (!sources) {
       return tl::unexpected{std::move(sources.error())};
     }
-    auto writer = BagWriter::create(writer_options(sources->ports(), output_, compress_),
+    auto writer = BagWriter::create(writer_options(sources->ports(), output_, compress_, mcap_),
                                     sources->calibration);
     if (!writer) {
       return tl::unexpected{std::move(writer.error())};
@@ -258,6 +261,7 @@ class RecordVerb final : public Verb {
   bool live_ = false;
   bool gray_ = false;
   bool compress_ = false;
+  bool mcap_ = false;
 };
 
 }  // namespace

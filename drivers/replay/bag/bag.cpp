@@ -34,17 +34,17 @@ constexpr const char* kMetadataName = "metadata.yaml";
 // Times outside of [1970, 2100) are damage; inside, differences cannot overflow.
 constexpr std::int64_t kEndOfTimeNs = 4'102'444'800'000'000'000;
 
-bool is_database_name(const fs::path& path) {
+bool is_bag_file_name(const fs::path& path) {
   const std::string name = path.filename().native();
-  return name.ends_with(".db3") || name.ends_with(".db3.zstd");
+  return name.ends_with(".db3") || name.ends_with(".db3.zstd") || name.ends_with(".mcap");
 }
 
-std::vector<fs::path> database_files_in(const fs::path& folder) {
+std::vector<fs::path> bag_files_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (auto entry = fs::directory_iterator{folder, error};
        !error && entry != fs::directory_iterator{}; entry.increment(error)) {
-    if (is_database_name(entry->path())) {
+    if (is_bag_file_name(entry->path())) {
       files.push_back(entry->path());
     }
   }
@@ -83,9 +83,9 @@ bool is_time(std::int64_t ns) {
 bool Bag::looks_like_one(const fs::path& path) {
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
-    return is_database_name(path);
+    return is_bag_file_name(path);
   }
-  return fs::exists(path / kMetadataName, ignored) || !database_files_in(path).empty();
+  return fs::exists(path / kMetadataName, ignored) || !bag_files_in(path).empty();
 }
 
 Result<std::unique_ptr<Bag>> Bag::open(const fs::path& path) {
@@ -97,7 +97,7 @@ Result<std::unique_ptr<Bag>> Bag::open(const fs::path& path) {
   } else if (!fs::is_directory(path, ignored)) {
     opened = bag->open_scanned({path});
   } else if (!fs::exists(path / kMetadataName, ignored)) {
-    opened = bag->open_scanned(database_files_in(path));
+    opened = bag->open_scanned(bag_files_in(path));
   } else {
     opened = read_small_file(path / kMetadataName)
                  .and_then([&](const std::string& yaml) {
@@ -110,8 +110,8 @@ Result<std::unique_ptr<Bag>> Bag::open(const fs::path& path) {
     return tl::unexpected{std::move(opened).error()};
   }
   if (bag->parts_.empty()) {
-    return fail(ErrorCode::kNotFound, "{}: holds no bag: neither metadata.yaml nor a .db3 file",
-                path.native());
+    return fail(ErrorCode::kNotFound,
+                "{}: holds no bag: neither metadata.yaml nor a .db3 or .mcap file", path.native());
   }
   std::ranges::sort(bag->parts_, [](const Part& a, const Part& b) {
     return std::tie(a.start_ns, a.path) < std::tie(b.start_ns, b.path);
@@ -135,11 +135,12 @@ Result<std::shared_ptr<BagFile>> Bag::open_part(const Part& part) {
 
 Result<void> Bag::open_described(const fs::path& folder, const Metadata& metadata) {
   const std::string where = (folder / kMetadataName).native();
-  if (metadata.storage_identifier != "sqlite3") {
-    return fail(ErrorCode::kUnsupported,
-                "{}: storage '{}' is not supported, only sqlite3; `ros2 bag convert` makes one of "
-                "the other",
-                where, metadata.storage_identifier);
+  if (metadata.storage_identifier != "sqlite3" && metadata.storage_identifier != "mcap") {
+    return fail(
+        ErrorCode::kUnsupported,
+        "{}: storage '{}' is not supported, only sqlite3 and mcap; `ros2 bag convert` makes "
+        "one of the other",
+        where, metadata.storage_identifier);
   }
   if (!metadata.compression_format.empty() && metadata.compression_format != "zstd") {
     return fail(ErrorCode::kUnsupported, "{}: compression '{}' is not supported, only zstd", where,
@@ -312,10 +313,11 @@ Result<void> Bag::advance(std::size_t index) {
     open_[index].row = *found;
     return {};
   }
-  open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(index));
   if (!row) {
+    delivered_ = index;  // it may go on behind what is damaged
     return tl::unexpected{std::move(row).error()};
   }
+  open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(index));
   return {};
 }
 

@@ -35,14 +35,14 @@ struct BagMessage {
   std::string origin;  ///< `FILE: message N (TOPIC)`
 };
 
-/// A rosbag2 recording: a folder with metadata.yaml and its database files, a folder with database
-/// files alone (their recorder was cut off before it wrote metadata.yaml), or one database file.
+/// A rosbag2 recording: a folder with metadata.yaml and its files (SQLite or MCAP), a folder with
+/// such files alone (their recorder was cut off before it wrote metadata.yaml), or one of them.
 /// Messages come in order of time over all files, of which only those that overlap in time are open
 /// at once. Thread-bound.
 class Bag {
  public:
-  /// Whether `path` is a bag by its names alone: a metadata.yaml or a .db3 (.db3.zstd) file in it,
-  /// or such a file.
+  /// Whether `path` is a bag by its names alone: a metadata.yaml, .db3 (.db3.zstd) or .mcap file in
+  /// it, or such a file.
   [[nodiscard]] static bool looks_like_one(const std::filesystem::path& path);
 
   [[nodiscard]] static Result<std::unique_ptr<Bag>> open(const std::filesystem::path& path);
@@ -67,7 +67,7 @@ class Bag {
   /// The next message of the selection; none at the end. An error concerns one message, or one file
   /// from that message on: the next call goes on behind it.
   [[nodiscard]] Result<std::optional<BagMessage>> next();
-  /// False once an error ended a file before its end.
+  /// False once an error cost messages, or ended a file before its end.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
 
  private:

@@ -37,7 +37,8 @@ class Collector {
 
   [[nodiscard]] bool wants(std::string_view topic) const {
     return topic == kStaticTransforms ||
-           (!topic.empty() && (topic == choice_.camera_info || topic == choice_.imu));
+           (!topic.empty() && ((topic == choice_.camera_info && !camera_) ||
+                               (topic == choice_.imu && imu_frame_.empty())));
   }
 
   void add(const BagMessage& message) {

@@ -38,6 +38,8 @@ Extras extras_of(const BagWriterOptions& options, const Calibration& calibration
           .camera = options.camera_stamps, .imu = options.imu_stamps, .legs = options.leg_stamps}};
 }
 
+constexpr bool kLatched = true;
+
 /// `/camera/color/image_raw` -> `/camera/color/camera_info`.
 std::string info_topic(const std::string& image_topic) {
   return image_topic.substr(0, image_topic.rfind('/')) + "/camera_info";
@@ -104,7 +106,7 @@ class BagWriter::Implementation {
     }
     message.header.stamp = *ros_stamp;
     status_ = storage_->write(topic, Message::kType, t_arrival.time_since_epoch().count(),
-                              cdr::encode(message));
+                              cdr::encode(message), !kLatched);
   }
 
   /// /tf_static, before the first sample.
@@ -116,7 +118,6 @@ class BagWriter::Implementation {
     add_transform(tf, options_.topics.base_frame, options_.camera_frame, calibration_.T_base_cam);
     add_transform(tf, options_.camera_frame, options_.imu_frame, calibration_.T_cam_imu);
     if (!tf.transforms.empty()) {
-      constexpr bool kLatched = true;
       status_ = storage_->write("/tf_static", ros::TfMessage::kType,
                                 t_arrival.time_since_epoch().count(), cdr::encode(tf), kLatched);
     }
@@ -144,6 +145,7 @@ Result<std::unique_ptr<BagWriter>> BagWriter::create(const BagWriterOptions& opt
                                                      const Calibration& calibration) {
   auto storage = Storage::create(
       {.directory = options.directory,
+       .storage = options.storage,
        .compression_level =
            options.compress ? std::optional{options.compression_level} : std::nullopt,
        .commit_after = options.commit_after,

@@ -222,12 +222,13 @@ TEST(DamagedBag, OtherFilesAndStoragesAreNamed) {
   const auto missing = folder.path() / "missing";
   EXPECT_EQ(read_all(missing).errors.front().message,
             missing.native() + ": no such file or folder");
-  const auto mcap = folder.path() / "mcap";
-  std::filesystem::create_directory(mcap);
-  EXPECT_THAT(read_all(mcap).errors.front().message, HasSubstr("holds no bag"));
-  write_file(mcap / "metadata.yaml",
-             "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n");
-  EXPECT_THAT(read_all(mcap).errors.front().message, HasSubstr("storage 'mcap' is not supported"));
+  const auto unknown = folder.path() / "unknown";
+  std::filesystem::create_directory(unknown);
+  EXPECT_THAT(read_all(unknown).errors.front().message, HasSubstr("holds no bag"));
+  write_file(unknown / "metadata.yaml",
+             "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: leveldb\n");
+  EXPECT_THAT(read_all(unknown).errors.front().message,
+              HasSubstr("storage 'leveldb' is not supported"));
 }
 
 }  // namespace

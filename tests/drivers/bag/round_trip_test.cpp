@@ -209,6 +209,7 @@ TEST(BagRoundTrip, EverySampleComesBackBitForBitInOrderOfArrival) {
     }
     BagWriterOptions options{.directory = path};
     options.compress = *rc::gen::arbitrary<bool>();
+    options.storage = *rc::gen::element(BagStorage::kSqlite, BagStorage::kMcap);
     auto writer = BagWriter::create(options, calibration());
     RC_ASSERT(writer.has_value());
     for (const Written& sample : written) {
@@ -229,11 +230,15 @@ TEST(BagRoundTrip, EverySampleComesBackBitForBitInOrderOfArrival) {
   }));
 }
 
-TEST(BagRoundTrip, CalibrationComesBack) {
+class CalibrationRoundTrip : public testing::TestWithParam<BagStorage> {};
+INSTANTIATE_TEST_SUITE_P(Storages, CalibrationRoundTrip,
+                         testing::Values(BagStorage::kSqlite, BagStorage::kMcap));
+
+TEST_P(CalibrationRoundTrip, CalibrationComesBack) {
   const tests::TemporaryDirectory folder;
   const auto path = folder.path() / "bag";
   FramePool pool{2};
-  BagWriterOptions options{.directory = path};
+  BagWriterOptions options{.directory = path, .storage = GetParam()};
   options.imu_stamps = {.domain = StampDomain::kDevice,
                         .wrap = std::chrono::microseconds{1LL << 32},
                         .on_camera_clock = true};

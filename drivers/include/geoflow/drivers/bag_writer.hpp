@@ -16,16 +16,23 @@
 /// Recording to rosbag2 (docs/recordings.md).
 namespace geoflow::drivers {
 
+/// How a bag keeps its messages: both are rosbag2's own.
+enum class BagStorage {
+  kSqlite,  ///< a database: whole up to the last second however the recording ends
+  kMcap,    ///< one file in chunks with checksums, which Foxglove opens as it is
+};
+
 struct BagWriterOptions {
   std::filesystem::path directory;  ///< is made; must not exist
-  TopicNames topics{};              ///< under which names samples are written
+  BagStorage storage = BagStorage::kSqlite;
+  TopicNames topics{};  ///< under which names samples are written
   std::string camera_frame = "camera_color_optical_frame";
   std::string imu_frame = "camera_imu_optical_frame";
   std::string odom_frame = "odom";
-  bool compress = false;      ///< every message as a Zstandard frame
+  bool compress = false;      ///< every message, in MCAP every chunk, as a Zstandard frame
   int compression_level = 1;  ///< 1 (fast) to 19
-  /// A transaction ends after this much recorded time or this many bytes: what a power cut can
-  /// cost.
+  /// A transaction, in MCAP a chunk, ends after this much recorded time or this many bytes: what a
+  /// power cut can cost.
   Duration commit_after = std::chrono::seconds{1};
   std::size_t commit_after_bytes = std::size_t{16} * 1024 * 1024;
   /// How the samples to come are stamped; kept in the bag, so that a replay treats them alike.
@@ -45,10 +52,10 @@ struct OdometrySample {
 /// `header.stamp` is the device's time, the bag's time of a message its arrival; reading gives both
 /// back to the nanosecond. With every image goes a camera_info; /tf_static stands at the beginning.
 ///
-/// Until close() the bag is a folder with a database and its write-ahead log, which readers open as
-/// it is, also after a power cut. Thread-safe; may wait for the disk, so a live source needs a
-/// queue before it. The first failure is kept: from then on samples are ignored, and status() and
-/// close() return it.
+/// Until close() the bag is a folder with a database and its write-ahead log, or with an MCAP file
+/// without a summary, which readers open as it is, also after a power cut. Thread-safe; may wait
+/// for the disk, so a live source needs a queue before it. The first failure is kept: from then on
+/// samples are ignored, and status() and close() return it.
 class BagWriter final : public CameraSink, public ImuSink, public LegSink {
  public:
   /// kInvalidArgument where the folder exists.
@@ -71,7 +78,7 @@ class BagWriter final : public CameraSink, public ImuSink, public LegSink {
 
   /// The first failure so far.
   [[nodiscard]] Result<void> status() const;
-  /// Ends the bag: one database file without a log, and metadata.yaml. Later samples are ignored.
+  /// Ends the bag: one file, and metadata.yaml. Later samples are ignored.
   [[nodiscard]] Result<void> close();
 
  private:

@@ -54,6 +54,13 @@ struct MapSummary {
 /// The map's points [m].
 [[nodiscard]] std::vector<Vector3d> sparse_points(const StoredMap& map);
 
+/// A place that was known again: base_link's positions at the two keyframes that a loop ties [m].
+struct MapLoop {
+  Vector3d p_map_from = Vector3d::Zero();
+  Vector3d p_map_to = Vector3d::Zero();
+};
+[[nodiscard]] std::vector<MapLoop> loops(const StoredMap& map);
+
 /// A small piece of surface in the map.
 struct MapSurfel {
   Vector3d p_map = Vector3d::Zero();       ///< [m]
