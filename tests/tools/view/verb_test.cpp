@@ -81,7 +81,8 @@ TEST_F(ViewProgram, ShowsADaemonThatComesAndGoesAndComesAgain) {
   EXPECT_THAT(page->read_until("the daemon has ended", seconds{10}), HasSubstr("event: link"));
   daemon = start_daemon();
   const auto again = open_events();
-  EXPECT_THAT(again->read_until("p_odom_base", seconds{30}), HasSubstr("\"up\":true"));
+  EXPECT_THAT(again->read_until("\"up\":true", seconds{30}), HasSubstr("\"up\":true"));
+  EXPECT_THAT(again->read_until("p_odom_base", seconds{30}), HasSubstr("p_odom_base"));
   EXPECT_EQ(http_get(port_, "/").status, 200);
   view_->send_signal(SIGTERM);
   EXPECT_EQ(view_->wait(seconds{10}), 0);
