@@ -136,8 +136,13 @@
 
   function onStatus(status) {
     byId("summary").textContent = status.summary || "\u00a0";
+    // A source that streams may bring nothing all the same: its state is its driver's, silence the daemon's finding.
+    const stateOf = (name, health) => {
+      const silent = new RegExp(`${name} (silent [^,;]+)`, "i").exec(status.summary || "");
+      return silent ? silent[1] : health.state;
+    };
     const rows = Object.entries(status.health || {}).map(([name, health]) => [
-      [name], [health.state, health.state === "streaming" ? "good" : "bad"],
+      [name], [stateOf(name, health), stateOf(name, health) === "streaming" ? "good" : "bad"],
       [String(health.delivered)], [String(health.rejected)], [String(health.dropped)], [health.reason || "", "text"]]);
     const part = (name, trouble, fine, note) => rows.push([
       [name], [trouble ? "trouble" : fine, trouble ? "bad" : "good"], [""], [""], [""], [trouble || note, "text"]]);

@@ -115,7 +115,8 @@ MHD_Result answer(MHD_Connection* connection, unsigned status, const char* type,
         {"X-Content-Type-Options", "nosniff"},
         {"Referrer-Policy", "no-referrer"},
         {"Content-Security-Policy",
-         "default-src 'none'; connect-src 'self'; style-src 'unsafe-inline'; script-src "
+         "default-src 'none'; connect-src 'self'; img-src data:; style-src 'unsafe-inline'; "
+         "script-src "
          "'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"}}) {
     ::MHD_add_response_header(response, name, value);
   }

@@ -248,9 +248,10 @@ def main():
                 arguments.screenshots.mkdir(parents=True, exist_ok=True)
                 time.sleep(5)
                 check_screens(browser, arguments.screenshots)
+            check_restart(check, browser, programs, daemon, faults)
+            # Last on this page, which software rendering of that many holds up.
             fps = browser.run(FRAMES_A_SECOND.replace("COUNT", str(POINTS)))
             print(f"     {POINTS} points: {fps:.1f} frames a second (software rendering; load {os.getloadavg()[0]:.1f})")
-            check_restart(check, browser, programs, daemon, faults)
             check_run(check, browser, programs, arguments.screenshots)
             complaints = browser.complaints()
             check.that(not complaints, f"no error on the console {complaints or ''}")
