@@ -74,9 +74,16 @@ function(geoflow_part name)
   add_library(geoflow::${name} ALIAS geoflow_${name})
 endfunction()
 
+add_custom_target(slow_tests)
+set(sanitized FALSE)
+if(GEOFLOW_SANITIZE)
+  set(sanitized TRUE)
+endif()
+
 # geoflow_test(NAME SOURCES … DEPENDS … [LABELS fast|slow …] [PRIVATE_OF part …])
 # A GoogleTest program; PRIVATE_OF gives it the private headers of those parts. Its tests are labelled `fast` unless LABELS
-# says otherwise, then with the name of their folder in tests/: fast/hal. The target tests_FOLDER builds all of a folder.
+# says otherwise, then with the name of their folder in tests/: fast/hal. The target tests_FOLDER builds all of a folder,
+# slow_tests all slow ones: with sanitizers they are not among what is built by default, as CI runs the fast ones alone then.
 function(geoflow_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LABELS;PRIVATE_OF" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -96,6 +103,10 @@ function(geoflow_test name)
     add_custom_target(tests_${folder})
   endif()
   add_dependencies(tests_${folder} ${name})
+  if("slow" IN_LIST ARG_LABELS)
+    add_dependencies(slow_tests ${name})
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ${sanitized})
+  endif()
   list(APPEND ARG_LABELS ${folder})
   list(REMOVE_DUPLICATES ARG_LABELS)
   # One label with slashes: gtest_discover_tests cannot pass on a list.
