@@ -116,7 +116,7 @@ endfunction()
 
 # geoflow_fuzz(NAME SOURCES … DEPENDS … [PRIVATE_OF part …])
 # The fuzz target of one decoder, NAME_fuzz in fuzz/: its source defines LLVMFuzzerTestOneInput. With GEOFLOW_FUZZ (preset asan)
-# it is linked with libFuzzer, and .ci/run runs it for a minute; otherwise with seeds_main.cpp, as a test that runs the
+# it is linked with libFuzzer, and .ci/run runs it for a while; otherwise with seeds_main.cpp, as a test that runs the
 # seeds in tests/fuzz/seeds/NAME and mutations of them. The target fuzz_targets builds them all.
 function(geoflow_fuzz name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_OF" ${ARGN})
