@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sums up ctest's JUnit files: every skipped test with its reason, every failed one, and one line of counts.
+"""Sums up ctest's JUnit files: every skipped test with its reason, every failed one with what it said last, and one line of counts.
 
 Usage: test_summary.py FILE.xml...
 Exits with 1 when a test failed, a file is missing or no test ran.
@@ -18,6 +18,13 @@ def skip_reason(output):
     match = GTEST_SKIP.search(output)
     text = match["why"] if match else (output.strip().splitlines() or [""])[-1]
     return " ".join(text.split()) or "no reason given"
+
+
+def complaint(output, most=12):
+    """What a failed test said: its lines that say so, else its last ones."""
+    lines = [line.rstrip() for line in output.splitlines() if line.strip()]
+    told = [line for line in lines if re.search(r"\bFAIL\b|: Failure$|Error|error", line)] or lines
+    return [f"    {line}" for line in told[-most:]]
 
 
 def read_cases(path):
@@ -47,7 +54,7 @@ def summarise(paths, out):
             if status == "skipped":
                 lines.append(f"skipped: {name}: {skip_reason(output)}")
             elif status == "failed":
-                lines.append(f"failed: {name}")
+                lines += [f"failed: {name}", *complaint(output)]
     for line in lines:
         print(line, file=out)
     total = sum(count.values())

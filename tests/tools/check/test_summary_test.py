@@ -40,7 +40,12 @@ class Summary(unittest.TestCase):
 
     def test_a_failed_test_is_named_and_fails_the_run(self):
         code, lines = self.summarise(PASSED + FAILED)
-        self.assertEqual((code, lines), (1, ["failed: C.D", "1 passed, 1 failed, 0 skipped"]))
+        self.assertEqual((code, lines), (1, ["failed: C.D", "    boom", "1 passed, 1 failed, 0 skipped"]))
+
+    def test_of_a_long_output_the_lines_that_say_failure_are_shown(self):
+        said = "\n".join([f"ok   {i}" for i in range(40)] + ["FAIL it is drawn", "ok   the rest"])
+        _, lines = self.summarise(FAILED.replace("boom", said))
+        self.assertEqual(lines[:2], ["failed: C.D", "    FAIL it is drawn"])
 
     def test_a_run_without_results_fails(self):
         self.assertEqual(self.summarise(PASSED, None)[0], 1)

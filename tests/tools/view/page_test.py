@@ -172,8 +172,7 @@ def check_live(check, browser, programs, url):
     check.soon(lambda: browser.run("return document.querySelectorAll('#plots canvas').length") >= 7, "all plots are there")
     found = check.soon(lambda: "map as saved" in browser.text("#legend") and browser.text("#legend"), "the saved map appears")
     check.that(bool(found) and " 0 points" not in found, f"it has points: {found}")
-    drawn = browser.run("return document.getElementById('scene').dataset.vertices")
-    check.that(int(drawn or 0) > 1000, f"it is drawn: {drawn} vertices")
+    check.soon(lambda: int(browser.run("return document.getElementById('scene').dataset.vertices") or 0) > 1000, "it is drawn")
     return daemon
 
 
