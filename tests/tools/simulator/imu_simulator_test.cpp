@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -296,6 +297,41 @@ TEST(ImuSimulator, NoiseAndRandomWalkHaveTheirDensities) {
   const double white = options.noise.accel_noise_density * std::sqrt(200);
   EXPECT_NEAR(deviation(accel) / white, 1, 0.03);
   EXPECT_NEAR(deviation(steps) / (options.noise.gyro_random_walk / std::sqrt(200)), 1, 0.03);
+}
+
+TEST(ImuSimulator, AxesErrInScaleAndDirectionByAsMuchAsTheKnobsSay) {
+  constexpr std::uint64_t kSeeds = 40;
+  constexpr double kScale = 0.01;
+  constexpr double kMisalignmentRad = 0.02;
+  const Walk walk = walk_for(4);
+  const std::vector<ImuReading> exact =
+      ImuSimulator{walk, mounted_imu(), 1, exact_imu()}.readings();
+  ImuOptions options = exact_imu();
+  options.scale_error = kScale;
+  options.misalignment_rad = kMisalignmentRad;
+  std::vector<double> on_axis;
+  std::vector<double> beside;
+  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+    const std::vector<ImuReading> read = ImuSimulator{walk, mounted_imu(), seed, options}.readings();
+    for (const auto measured : {&ImuSample::accel_mps2, &ImuSample::gyro_radps}) {
+      // The matrix that makes what is read of what is true, by least squares.
+      Matrix3d read_by_true = Matrix3d::Zero();
+      Matrix3d true_by_true = Matrix3d::Zero();
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        const Vector3d& truth = exact[i].sample.*measured;
+        read_by_true += read[i].sample.*measured * truth.transpose();
+        true_by_true += truth * truth.transpose();
+      }
+      const Matrix3d errors = read_by_true * true_by_true.inverse() - Matrix3d::Identity();
+      for (Eigen::Index row = 0; row < 3; ++row) {
+        for (Eigen::Index column = 0; column < 3; ++column) {
+          (row == column ? on_axis : beside).push_back(errors(row, column));
+        }
+      }
+    }
+  }
+  EXPECT_NEAR(deviation(on_axis) / kScale, 1, 0.15);
+  EXPECT_NEAR(deviation(beside) / kMisalignmentRad, 1, 0.1);
 }
 
 TEST(ImuSimulator, FaultsDistortInBurstsThatTheTruthNames) {

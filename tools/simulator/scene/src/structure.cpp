@@ -1,3 +1,5 @@
+#include <numbers>
+
 #include "geoflow/tools/simulator/lanes.hpp"
 #include "geoflow/tools/simulator/random.hpp"
 #include "geoflow/tools/simulator/scene.hpp"
@@ -15,9 +17,9 @@ namespace {
 
 constexpr float kShortestHall_m =
     24;  // longer than depth reaches, so that a flat wall's ends do not help
-constexpr float kHallDepth_m = 16;
 constexpr float kStage_m = 9;  // of the middle of the hall is walked along
 constexpr float kPanelHeight_m = 1.8F;
+constexpr float kPi = std::numbers::pi_v<float>;
 
 /// A row of standing panels from the origin along x, that zigzags towards -y.
 void add_zigzag(Builder builder, float length_m, int material, Random random) {
@@ -33,6 +35,17 @@ void add_zigzag(Builder builder, float length_m, int material, Random random) {
     builder.quad(to - behind, from - to, {0, 0, kPanelHeight_m}, material);
     from = to;
     out = !out;
+  }
+}
+
+/// What stands along a side of the lane, which lies towards -y: panels, a picture on the wall, or
+/// nothing.
+void add_side(Builder builder, float hall_m, const StructureCase& which, int material, Random random) {
+  if (which.structure) {
+    const float length_m = kStage_m + 8.0F;
+    add_zigzag(builder.at({0.5F * (hall_m - length_m), -0.05F, 0}), length_m, material, random);
+  } else if (which.texture) {
+    builder.quad({0, -0.01F, 0}, {hall_m, 0, 0}, {0, 0, kPanelHeight_m + 0.5F}, material);
   }
 }
 
@@ -54,33 +67,30 @@ void lay_out_structure(Builder builder, const StructureCase& which, Random rando
        .overlay = builder.texture(paint_stains(0.25F, random.fork("stains")), 4.3F)});
   const float distance = which.near ? random.uniform(0.9F, 1.1F) : random.uniform(2.0F, 2.4F);
   const float hall_m = random.uniform(kShortestHall_m, kShortestHall_m + 4.0F);
-  const Room hall{.size_m = {hall_m, kHallDepth_m, 4.0F},
+  // A lane between two like sides: one is before the camera wherever the path, which winds from one to the other, leads.
+  const float sway = which.near ? 0.45F : 0.8F;
+  const float reach = which.structure ? 0.65F : 0.05F;
+  const float middle = reach + distance + sway;
+  const Room hall{.size_m = {hall_m, 2.0F * middle, 4.0F},
                   .floor = which.texture ? coloured : plain,
                   .wall = wall,
                   .ceiling = builder.paint(grey(0.7F))};
   add_room(builder, hall);
   add_ceiling_lamps(builder, hall.size_m, {.lux = 350, .spacing_m = {4, 4}});
   const float begin = 0.5F * (hall_m - kStage_m);
-  if (which.structure) {
-    add_zigzag(builder.at({begin - 4.0F, kHallDepth_m - 0.05F, 0}), kStage_m + 8.0F,
-               which.texture ? coloured : plain, random.fork("panels"));
-  } else if (which.texture) {
-    builder.quad({0, kHallDepth_m - 0.01F, 0}, {hall_m, 0, 0}, {0, 0, kPanelHeight_m + 0.5F},
-                 coloured);
+  const float end = begin + kStage_m;
+  for (const bool left : {true, false}) {
+    const Builder side = left ? builder.at({0, 2.0F * middle, 0}) : builder.at({hall_m, 0, 0}, kPi);
+    add_side(side, hall_m, which, which.texture ? coloured : plain,
+             random.fork(left ? "panels" : "other panels"));
   }
-
-  // Slantwise to the wall and away from it, so that the wall is before the camera half of the time.
-  const float reach = which.structure ? 0.65F : 0.05F;
-  const float near_y = kHallDepth_m - reach - distance;
-  const float far_y = near_y - (which.near ? 0.9F : 1.6F);
   const int legs = which.near ? 8 : 6;
   for (int leg = 0; leg <= legs; ++leg) {
-    const auto x =
-        static_cast<double>(begin + kStage_m * static_cast<float>(leg) / static_cast<float>(legs));
-    builder.scene().waypoints.emplace_back(x, static_cast<double>(leg % 2 == 0 ? far_y : near_y));
+    const float x = begin + kStage_m * static_cast<float>(leg) / static_cast<float>(legs);
+    const float y = middle + (leg % 2 == 0 ? -sway : sway);
+    builder.scene().waypoints.emplace_back(static_cast<double>(x), static_cast<double>(y));
   }
-  add_pedestrians(builder, {{{begin, far_y - 1.5F}, {begin + kStage_m, far_y - 1.5F}}}, 0,
-                  random.fork("people"));
+  add_pedestrians(builder, {{{begin, middle}, {end, middle}}}, 0, random.fork("people"));
 }
 
 }  // namespace geoflow::simulator
