@@ -111,10 +111,12 @@ std::optional<drivers::RosPose> make_ros_pose(const geoflow_pose& pose, const Ro
 std::vector<RosDiagnostic> make_diagnostics(const service::Observation& seen,
                                             const std::string& summary) {
   std::vector<RosDiagnostic> diagnostics{pose_diagnostic(seen, summary)};
-  for (const auto& [name, health] : seen.sources) {
-    diagnostics.push_back({.level = level_of(health.state),
+  for (const auto& [name, health, since_sample, silent] : seen.sources) {
+    diagnostics.push_back({.level = silent ? Level::kStale : level_of(health.state),
                            .name = "geoflow: " + name,
-                           .message = health.reason.empty() ? "ok" : health.reason,
+                           .message = !health.reason.empty() ? health.reason
+                                      : silent               ? "silent"
+                                                             : "ok",
                            .values = {{"delivered", std::to_string(health.delivered)},
                                       {"rejected", std::to_string(health.rejected)},
                                       {"dropped", std::to_string(health.dropped)}}});

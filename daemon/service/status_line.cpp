@@ -1,6 +1,5 @@
 #include "service/status_line.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -14,11 +13,32 @@
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "service/source_watch.hpp"
+
 namespace geoflow::daemon::service {
 namespace {
 
-constexpr Duration kSilence = std::chrono::milliseconds{1500};
 constexpr Duration kRateWindow = std::chrono::seconds{3};
+
+/// As in `legs silent 2 s (no interface can0)`.
+std::string describe(const WatchedSource& source) {
+  const SourceHealth& health = source.health;
+  const std::string name = source.name == "imu" ? "IMU" : source.name;
+  const std::string reason = health.reason.empty() ? "" : fmt::format(" ({})", health.reason);
+  if (source.silent) {
+    return fmt::format("{} silent {}{}", name, in_words(*source.silent), reason);
+  }
+  switch (health.state) {
+    case SourceState::kDegraded:
+      return fmt::format("{} degraded{}", name, reason);
+    case SourceState::kFailed:
+      return fmt::format("{} failed{}", name, reason);
+    case SourceState::kStopped:
+    case SourceState::kStreaming:
+      break;
+  }
+  return name + " ok";
+}
 
 }  // namespace
 
@@ -28,8 +48,8 @@ std::string StatusLine::update(const Observation& seen, HostTime now) {
   if (!seen.trouble.empty()) {
     line += separator + seen.trouble;
   }
-  for (const NamedHealth& source : seen.sources) {
-    line += separator + describe(source, now);
+  for (const WatchedSource& source : seen.sources) {
+    line += separator + describe(source);
     separator = ", ";
   }
   return line;
@@ -59,32 +79,6 @@ double StatusLine::rate_hz(std::uint64_t frames, HostTime now) {
   }
   const double seconds = to_seconds(now - frames_.front().t);
   return seconds > 0 ? static_cast<double>(frames - frames_.front().count) / seconds : 0;
-}
-
-std::string StatusLine::describe(const NamedHealth& source, HostTime now) {
-  const SourceHealth& health = source.health;
-  auto count = std::ranges::find(counts_, source.name, &Count::name);
-  if (count == counts_.end()) {
-    count = counts_.insert(counts_.end(),
-                           {.name = source.name, .delivered = health.delivered, .grew = now});
-  }
-  if (count->delivered != health.delivered) {
-    *count = {.name = source.name, .delivered = health.delivered, .grew = now};
-  }
-  const std::string reason = health.reason.empty() ? "" : fmt::format(" ({})", health.reason);
-  if (now - count->grew > kSilence) {
-    return fmt::format("{} silent {}{}", source.name, in_words(now - count->grew), reason);
-  }
-  switch (health.state) {
-    case SourceState::kDegraded:
-      return fmt::format("{} degraded{}", source.name, reason);
-    case SourceState::kFailed:
-      return fmt::format("{} failed{}", source.name, reason);
-    case SourceState::kStopped:
-    case SourceState::kStreaming:
-      break;
-  }
-  return source.name + " ok";
 }
 
 }  // namespace geoflow::daemon::service

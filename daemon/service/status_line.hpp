@@ -6,23 +6,18 @@
 #include <vector>
 
 #include "geoflow/daemon/geoflow_protocol.h"
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
+
+#include "service/source_watch.hpp"
 
 namespace geoflow::daemon::service {
 
-/// One source of samples and how it is.
-struct NamedHealth {
-  std::string name;  ///< as it is to be read
-  SourceHealth health;
-};
-
 /// What the status line is made from.
 struct Observation {
-  std::optional<geoflow_pose> pose{};  ///< the newest of a frame
-  std::uint64_t frames = 0;            ///< with an estimate, so far
-  std::vector<NamedHealth> sources{};  ///< of samples
-  std::string trouble{};               ///< why there is no source yet: a sentence
+  std::optional<geoflow_pose> pose{};    ///< the newest of a frame
+  std::uint64_t frames = 0;              ///< with an estimate, so far
+  std::vector<WatchedSource> sources{};  ///< of samples
+  std::string trouble{};                 ///< why there is no source yet: a sentence
 };
 
 /// The daemon's state in words, for `systemctl status`:
@@ -31,31 +26,24 @@ struct Observation {
 ///     STARTING; no D435i is connected
 ///
 /// The rate is that of the last few seconds; the time is since the status became this one; a source
-/// is silent when it has delivered nothing for more than a second, degraded when it says so itself.
+/// is silent as SourceWatch finds it, degraded when it says so itself.
 /// Thread-compatible; reads no clock.
 class StatusLine {
  public:
-  /// To be called about once a second: silence is told to this resolution.
+  /// To be called about once a second.
   [[nodiscard]] std::string update(const Observation& seen, HostTime now);
 
  private:
-  struct Count {
-    std::string name;
-    std::uint64_t delivered = 0;
-    HostTime grew;
-  };
   struct Frames {
     std::uint64_t count = 0;
     HostTime t;
   };
   [[nodiscard]] std::string describe_pose(const Observation& seen, HostTime now);
-  [[nodiscard]] std::string describe(const NamedHealth& source, HostTime now);
   [[nodiscard]] double rate_hz(std::uint64_t frames, HostTime now);
 
   std::optional<std::uint8_t> status_;
   HostTime since_;
   std::vector<Frames> frames_;  // oldest first
-  std::vector<Count> counts_;
 };
 
 }  // namespace geoflow::daemon::service

@@ -40,6 +40,7 @@
 #include "service/given_sockets.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
+#include "service/source_watch.hpp"
 #include "service/status_line.hpp"
 #include "src/signal_watch.hpp"
 #include "src/worker.hpp"
@@ -282,12 +283,12 @@ class Daemon {
     }
     map_.turn(worker_->map(), running_.map.save_interval, now);
     reporter_.watch(worker_->threads(), now);
+    sources_.look(worker_->sources(), now);
     if (reporter_.is_due(now)) {
-      service::Observation seen{
-          .pose = newest_, .frames = worker_->frames(), .trouble = worker_->trouble()};
-      for (auto& [name, health] : worker_->sources()) {
-        seen.sources.push_back({.name = name == "imu" ? "IMU" : name, .health = std::move(health)});
-      }
+      service::Observation seen{.pose = newest_,
+                                .frames = worker_->frames(),
+                                .sources = sources_.sources(),
+                                .trouble = worker_->trouble()};
       if (seen.trouble.empty() && !map_.trouble().empty()) {
         seen.trouble = "the map is not saved: " + map_.trouble();
       }
@@ -303,6 +304,10 @@ class Daemon {
 
   [[nodiscard]] nlohmann::json status() {
     nlohmann::json status = worker_ ? worker_->status() : nlohmann::json::object();
+    if (worker_) {
+      sources_.look(worker_->sources(), HostClock::now());
+    }
+    status["health"] = service::to_json(sources_.sources());
     status["version"] = std::string{version()};
     status["pid"] = ::getpid();
     status["uptime_s"] = to_seconds(HostClock::now() - began_);
@@ -350,6 +355,7 @@ class Daemon {
   std::unique_ptr<bus::RosBus> bus_;  // null: not published
   std::unique_ptr<Worker> worker_;
   std::optional<geoflow_pose> newest_;
+  service::SourceWatch sources_;
   service::Reporter reporter_{service::watchdog_period()};
   std::optional<HostTime> leaving_;
   std::optional<Error> failure_;

@@ -32,32 +32,11 @@
 #include "geoflow/timesync/doorbell.hpp"
 
 #include "map/map_keeper.hpp"
+#include "service/source_watch.hpp"
 #include "src/opener.hpp"
 
 namespace geoflow::daemon {
 namespace {
-
-const char* name_of(SourceState state) {
-  switch (state) {
-    case SourceState::kStopped:
-      return "stopped";
-    case SourceState::kStreaming:
-      return "streaming";
-    case SourceState::kDegraded:
-      return "degraded";
-    case SourceState::kFailed:
-      return "failed";
-  }
-  return "unknown";
-}
-
-nlohmann::json to_json(const SourceHealth& health) {
-  return {{"state", name_of(health.state)},
-          {"reason", health.reason},
-          {"delivered", health.delivered},
-          {"rejected", health.rejected},
-          {"dropped", health.dropped}};
-}
 
 nlohmann::json to_json(const drivers::D435iStatus& camera) {
   return {{"streaming", camera.streaming},
@@ -226,9 +205,6 @@ nlohmann::json Worker::status() {
   } else if (const auto* d435i = dynamic_cast<const drivers::D435i*>(run_->camera.get())) {
     status["d435i"] = to_json(d435i->status());
   }
-  for (const auto& [name, health] : sources()) {
-    status["health"][name] = to_json(health);
-  }
   return status;
 }
 
@@ -247,8 +223,8 @@ std::vector<ThreadActivity> Worker::threads() const {
   return threads;
 }
 
-std::vector<SourceReport> Worker::sources() {
-  std::vector<SourceReport> reports;
+std::vector<service::SourceReport> Worker::sources() {
+  std::vector<service::SourceReport> reports;
   if (run_) {
     const Ports ports = run_->ports();
     reports.push_back({.name = "camera", .health = ports.camera->health()});

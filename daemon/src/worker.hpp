@@ -16,7 +16,6 @@
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/thread_activity.hpp"
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -25,15 +24,10 @@
 #include "geoflow/timesync/latest.hpp"
 
 #include "map/map_keeper.hpp"
+#include "service/source_watch.hpp"
 #include "src/opener.hpp"
 
 namespace geoflow::daemon {
-
-/// How one of the run's sources is.
-struct SourceReport {
-  std::string name;  ///< camera, imu or legs
-  SourceHealth health;
-};
 
 /// One run of the configured source in the background: first it is opened, which for a camera may
 /// take until it is there; then the live pipeline, or lock step on one thread. It rings the bell
@@ -75,7 +69,7 @@ class Worker {
   /// What its threads show of themselves.
   [[nodiscard]] std::vector<ThreadActivity> threads() const;
   /// How the sources are; empty until the source is open.
-  [[nodiscard]] std::vector<SourceReport> sources();
+  [[nodiscard]] std::vector<service::SourceReport> sources();
   /// Frames with an estimate so far.
   [[nodiscard]] std::uint64_t frames() const noexcept;
 

@@ -144,6 +144,23 @@ TEST_F(GeoflowdService, IsReadyWhenItListensThenTellsItsStateAndThatItStops) {
   EXPECT_EQ(process.wait(seconds{60}), 0) << process.err();
 }
 
+TEST_F(GeoflowdService, TellsTheAgeOfASensorsNewestSampleAndThatItIsSilent) {
+  const std::filesystem::path faults = path() / "faults.toml";
+  std::ofstream{faults}
+      << "[[fault]]\nkind = \"gap\"\nstream = \"camera\"\nfrom_s = 5.0\nuntil_s = 50.0\n";
+  const Process process{daemon({}, joined(replay({.frames = 240, .rate_hz = 4, .shift_px = 1}),
+                                          {"--faults", faults.string()})),
+                        log("daemon")};
+  ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
+  const auto heard = status().at("health").at("camera");
+  EXPECT_EQ(heard.at("state"), "streaming");
+  EXPECT_LT(heard.at("last_sample_s").get<double>(), 1.5);
+  ASSERT_TRUE(manager_.wait_for("camera silent")) << process.err();
+  const auto silent = status().at("health").at("camera");
+  EXPECT_EQ(silent.at("state"), "silent");
+  EXPECT_GT(silent.at("last_sample_s").get<double>(), 1.5);
+}
+
 TEST_F(GeoflowdService, ARecordingThatIsNotThereIsAnErrorBeforeItIsReady) {
   const auto done = run_process(daemon({}, {"--replay", log("nothing").string()}), log("daemon"));
   EXPECT_EQ(done.code, 3);

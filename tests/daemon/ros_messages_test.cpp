@@ -107,10 +107,13 @@ TEST(RosMessages, DiagnosticsAreOfThePoseAndOfEachSource) {
   service::Observation seen{.pose = record(estimate()), .frames = 12};
   seen.sources = {{.name = "camera",
                    .health = {.state = SourceState::kStreaming, .reason = "", .delivered = 9}},
-                  {.name = "IMU", .health = {.state = SourceState::kDegraded, .reason = "late"}},
-                  {.name = "legs", .health = {.state = SourceState::kFailed, .reason = "no can0"}}};
+                  {.name = "imu", .health = {.state = SourceState::kDegraded, .reason = "late"}},
+                  {.name = "legs", .health = {.state = SourceState::kFailed, .reason = "no can0"}},
+                  {.name = "feet",
+                   .health = {.state = SourceState::kStreaming, .reason = ""},
+                   .silent = std::chrono::seconds{2}}};
   const auto diagnostics = make_diagnostics(seen, "TRACKING 30 Hz");
-  ASSERT_EQ(diagnostics.size(), 4U);
+  ASSERT_EQ(diagnostics.size(), 5U);
   EXPECT_EQ(diagnostics[0].level, Level::kOk);
   EXPECT_EQ(diagnostics[0].message, "TRACKING 30 Hz");
   EXPECT_THAT(diagnostics[0].values, testing::Contains(testing::Pair("status", "TRACKING")));
@@ -120,6 +123,8 @@ TEST(RosMessages, DiagnosticsAreOfThePoseAndOfEachSource) {
   EXPECT_EQ(diagnostics[2].level, Level::kWarn);
   EXPECT_EQ(diagnostics[2].message, "late");
   EXPECT_EQ(diagnostics[3].level, Level::kError);
+  EXPECT_EQ(diagnostics[4].level, Level::kStale);
+  EXPECT_EQ(diagnostics[4].message, "silent");
   seen.pose->status = GEOFLOW_LOST;
   EXPECT_EQ(make_diagnostics(seen, "").front().level, Level::kError);
   seen.pose.reset();

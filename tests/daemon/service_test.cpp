@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
@@ -26,6 +27,7 @@
 #include "service/given_sockets.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
+#include "service/source_watch.hpp"
 #include "service/status_line.hpp"
 #include "service/watchdog.hpp"
 
@@ -136,37 +138,69 @@ geoflow_pose tracking() {
   return pose;
 }
 
-NamedHealth healthy(const std::string& name, std::uint64_t delivered) {
-  NamedHealth source{.name = name, .health = {}};
-  source.health.state = SourceState::kStreaming;
-  source.health.delivered = delivered;
-  return source;
+SourceReport streaming(const std::string& name, std::uint64_t delivered) {
+  return {.name = name,
+          .health = {.state = SourceState::kStreaming, .reason = {}, .delivered = delivered}};
+}
+
+TEST(SourceWatchTest, ASourceIsSilentWhenNothingHasComeForMoreThanASecondAndAHalf) {
+  SourceWatch watch;
+  const auto look = [&](std::uint64_t delivered, Duration t) {
+    watch.look({streaming("camera", delivered)}, at(t));
+    return watch.sources().front();
+  };
+  const WatchedSource first = look(0, {});
+  EXPECT_FALSE(first.since_sample);
+  EXPECT_FALSE(first.silent);
+  const WatchedSource never = look(0, seconds{2});  // whatever its driver says
+  EXPECT_FALSE(never.since_sample);
+  EXPECT_EQ(never.silent, seconds{2});
+  const WatchedSource heard = look(1, seconds{3});
+  EXPECT_EQ(heard.since_sample, Duration::zero());
+  EXPECT_FALSE(heard.silent);
+  EXPECT_FALSE(look(1, milliseconds{4500}).silent);
+  EXPECT_EQ(look(1, milliseconds{4600}).silent, milliseconds{1600});
+  EXPECT_FALSE(look(0, seconds{5}).silent);  // it has begun anew
+}
+
+TEST(SourceWatchTest, TheStatusReplyHasTheAgeOfTheNewestSampleAndSilenceAsAState) {
+  SourceWatch watch;
+  watch.look({streaming("camera", 5), streaming("legs", 0)}, at({}));
+  watch.look({streaming("camera", 6), streaming("legs", 0)}, at(seconds{2}));
+  watch.look({streaming("camera", 6), streaming("legs", 0)}, at(milliseconds{2250}));
+  const nlohmann::json health = to_json(watch.sources());
+  EXPECT_EQ(health.at("camera").at("state"), "streaming");
+  EXPECT_EQ(health.at("camera").at("last_sample_s"), 0.25);
+  EXPECT_EQ(health.at("camera").at("delivered"), 6);
+  EXPECT_EQ(health.at("legs").at("state"), "silent");
+  EXPECT_EQ(health.at("legs").at("last_sample_s"), nullptr);
 }
 
 TEST(StatusLineTest, TellsStatusRateQualityTimeAndSources) {
   StatusLine line;
+  SourceWatch watch;
   std::string text;
   for (std::uint64_t s = 0; s <= 250; ++s) {
-    NamedHealth legs = healthy("legs", 400 * std::min<std::uint64_t>(s, 248));
-    text = line.update({.pose = tracking(),
-                        .frames = 30 * s,
-                        .sources = {healthy("camera", 30 * s), healthy("IMU", 200 * s), legs}},
-                       at(s * seconds{1}));
+    const HostTime now = at(s * seconds{1});
+    watch.look({streaming("camera", 30 * s), streaming("imu", 200 * s),
+                streaming("legs", 400 * std::min<std::uint64_t>(s, 248))},
+               now);
+    text = line.update({.pose = tracking(), .frames = 30 * s, .sources = watch.sources()}, now);
   }
   EXPECT_EQ(text, "TRACKING 30 Hz, quality 87, 4 min; camera ok, IMU ok, legs silent 2 s");
 }
 
 TEST(StatusLineTest, SaysWhatASourceSaysOfItself) {
   StatusLine line;
-  NamedHealth camera = healthy("camera", 1);
-  camera.health.state = SourceState::kDegraded;
-  camera.health.reason = "the camera is away";
+  WatchedSource camera{.name = "camera",
+                       .health = {.state = SourceState::kDegraded, .reason = "the camera is away"}};
   EXPECT_EQ(line.update({.sources = {camera}}, at({})),
             "STARTING; camera degraded (the camera is away)");
+  camera.silent = seconds{130};
   EXPECT_EQ(line.update({.sources = {camera}}, at(seconds{130})),
             "STARTING; camera silent 2 min (the camera is away)");
+  camera.silent.reset();
   camera.health.state = SourceState::kFailed;
-  camera.health.delivered = 2;
   EXPECT_EQ(line.update({.sources = {camera}}, at(seconds{131})),
             "STARTING; camera failed (the camera is away)");
 }

@@ -136,13 +136,10 @@
 
   function onStatus(status) {
     byId("summary").textContent = status.summary || "\u00a0";
-    // A source that streams may bring nothing all the same: its state is its driver's, silence the daemon's finding.
-    const stateOf = (name, health) => {
-      const silent = new RegExp(`${name} (silent [^,;]+)`, "i").exec(status.summary || "");
-      return silent ? silent[1] : health.state;
-    };
+    const stateOf = health => health.state === "silent" && health.last_sample_s !== null
+      ? `silent ${Math.floor(health.last_sample_s)} s` : health.state;
     const rows = Object.entries(status.health || {}).map(([name, health]) => [
-      [name], [stateOf(name, health), stateOf(name, health) === "streaming" ? "good" : "bad"],
+      [name], [stateOf(health), health.state === "streaming" ? "good" : "bad"],
       [String(health.delivered)], [String(health.rejected)], [String(health.dropped)], [health.reason || "", "text"]]);
     const part = (name, trouble, fine, note) => rows.push([
       [name], [trouble ? "trouble" : fine, trouble ? "bad" : "good"], [""], [""], [""], [trouble || note, "text"]]);

@@ -182,7 +182,8 @@ def check_restart(check, browser, programs, daemon, faults):
     check.soon(lambda: "no daemon" in browser.text("#link"), "a daemon that dies is missed")
     programs.daemon("--faults", str(faults))
     check.soon(lambda: browser.text("#link") == "live", "the page connects again by itself")
-    check.soon(lambda: browser.run("return document.querySelectorAll('#health td.bad').length") > 0, "a silent camera turns its row")
+    check.soon(lambda: browser.run("return [...document.querySelectorAll('#health td.bad')].some(cell => /^silent [1-9]+ s$/.test(cell.textContent))"),
+               "a silent camera turns its row and says for how long")
 
 
 def check_run(check, browser, programs, screenshots):
