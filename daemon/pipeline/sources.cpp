@@ -13,7 +13,6 @@
 
 #include "geoflow/daemon/config.hpp"
 #include "geoflow/daemon/thread_activity.hpp"
-#include "geoflow/drivers/calibration_file.hpp"
 #include "geoflow/drivers/can_legs.hpp"
 #include "geoflow/drivers/d435i.hpp"
 #include "geoflow/drivers/dds_robot.hpp"
@@ -25,6 +24,8 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
+
+#include "pipeline/camera_calibration.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -112,33 +113,6 @@ Result<drivers::D435iOptions> d435i_options(const CameraConfig& config, PixelFor
   return options;
 }
 
-/// What a file says of the robot; and of the camera, where that does not know its own intrinsics
-/// well (`with_intrinsics`).
-Result<void> overlay_calibration(const std::filesystem::path& directory, bool with_intrinsics,
-                                 Calibration& calibration) {
-  auto file = drivers::load_calibration(directory);
-  if (!file) {
-    return tl::unexpected{std::move(file.error())};
-  }
-  if (with_intrinsics) {
-    if (file->camera.width != calibration.camera.width ||
-        file->camera.height != calibration.camera.height) {
-      return fail(ErrorCode::kInvalidArgument, "{}: is of a camera of {}x{}; this one is {}x{}",
-                  file->source, file->camera.width, file->camera.height, calibration.camera.width,
-                  calibration.camera.height);
-    }
-    calibration.camera = file->camera;
-  }
-  calibration.T_base_cam = file->T_base_cam;
-  if (file->T_cam_imu) {
-    calibration.T_cam_imu = file->T_cam_imu;
-    calibration.timeshift_cam_imu = file->timeshift_cam_imu;
-  }
-  calibration.imu_noise = file->imu_noise;
-  calibration.source += ", " + file->source;
-  return {};
-}
-
 Result<std::unique_ptr<drivers::LiveCamera>> open_d435i(const CameraConfig& config,
                                                         PixelFormat color) {
   return d435i_options(config, color)
@@ -171,8 +145,8 @@ Result<void> open_camera(const Config& config, PixelFormat color, Sources& sourc
   }
   return config.source.calibration.empty()
              ? Result<void>{}
-             : overlay_calibration(config.source.calibration, config.source.camera == kOpenNi2,
-                                   sources.calibration);
+             : complete_calibration(config.source.calibration, config.source.camera == kOpenNi2,
+                                    sources.calibration);
 }
 
 constexpr std::string_view kCan = "can";
@@ -207,9 +181,9 @@ Result<void> check_camera(const Config& config) {
   }
   Calibration calibration;
   if (!source.calibration.empty()) {
-    auto overlaid = overlay_calibration(source.calibration, false, calibration);
-    if (!overlaid) {
-      return overlaid;
+    auto completed = complete_calibration(source.calibration, false, calibration);
+    if (!completed) {
+      return completed;
     }
   }
   return source.imu.empty() || calibration.T_base_cam ? Result<void>{} : body_imu_without_place();
