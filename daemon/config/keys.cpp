@@ -183,6 +183,8 @@ void bind_pipeline(PipelineConfig& c, std::vector<Key>& keys) {
   keys.push_back({"pipeline.packet_queue", &c.packet_queue, 1, 64});
   keys.push_back({"pipeline.image_queue", &c.image_queue, 2, 64});
   keys.push_back({"pipeline.sample_queue", &c.sample_queue, 16, 65536});
+  keys.push_back({"pipeline.priority", &c.priority, 0, 99});
+  keys.push_back({"pipeline.lock_memory", &c.lock_memory});
 }
 
 void bind_map(MapConfig& c, std::vector<Key>& keys) {

@@ -23,6 +23,7 @@
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
+#include "geoflow/hal/thread.hpp"
 #include "geoflow/hal/time.hpp"
 #include "geoflow/slam/core.hpp"
 #include "geoflow/timesync/doorbell.hpp"
@@ -89,7 +90,8 @@ class Pipeline::Implementation {
         map_{"map", std::move(bells_.map), bells_.slam, run.statistics->mapping},
         global_map_{"global map", std::move(bells_.global_map), bells_.slam,
                     run.statistics->global_mapping},
-        ports_{run.ports()} {}
+        ports_{run.ports()},
+        priority_{config.pipeline.priority} {}
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
   ~Implementation() { stop(); }
@@ -149,6 +151,7 @@ class Pipeline::Implementation {
   std::jthread launch(const char* name, Body body, Doorbell* bell) {
     return std::jthread{[this, name, body, bell](const std::stop_token& stop) {
       ::pthread_setname_np(::pthread_self(), name);
+      take_precedence();
       const std::stop_callback stop_bell{stop, [bell] {
                                            if (bell != nullptr) {
                                              bell->stop();
@@ -156,6 +159,14 @@ class Pipeline::Implementation {
                                          }};
       (this->*body)(stop);
     }};
+  }
+
+  /// Of the calling thread, as configured; that it is not allowed is said once for all threads.
+  void take_precedence() {
+    const auto taken = priority_ > 0 ? go_first(priority_) : Result<void>{};
+    if (!taken && !refused_.test_and_set(std::memory_order_relaxed)) {
+      log::warning("pipeline", "threads have no precedence: {}", taken.error().message);
+    }
   }
 
   void replay(const std::stop_token& stop) {
@@ -285,6 +296,8 @@ class Pipeline::Implementation {
   MapWorker map_;         // works for slam
   MapWorker global_map_;  // likewise, for seconds at a time
   StartedPorts ports_;
+  int priority_;
+  std::atomic_flag refused_{};
   std::jthread slam_;
   std::jthread sync_;
   std::jthread replay_;

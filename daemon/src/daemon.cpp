@@ -38,6 +38,7 @@
 #include "server/event_loop.hpp"
 #include "server/pose_server.hpp"
 #include "service/given_sockets.hpp"
+#include "service/memory_lock.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
 #include "service/source_watch.hpp"
@@ -375,6 +376,11 @@ Result<ExitCode> run_daemon(const Config& config, std::function<Result<Config>()
   auto bell = timesync::Doorbell::create();
   if (!bell) {
     return tl::unexpected{std::move(bell.error())};
+  }
+  if (config.pipeline.lock_memory) {
+    if (const auto locked = service::lock_memory(); !locked) {
+      log::warning("daemon", "memory is not locked: {}", locked.error().message);
+    }
   }
   Daemon daemon{config, std::move(read_config), std::move(*loop), std::move(*bell)};
   auto done = daemon.start(std::move(*given)).and_then([&] { return daemon.run(); });

@@ -312,7 +312,8 @@ TEST(ImuSimulator, AxesErrInScaleAndDirectionByAsMuchAsTheKnobsSay) {
   std::vector<double> on_axis;
   std::vector<double> beside;
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
-    const std::vector<ImuReading> read = ImuSimulator{walk, mounted_imu(), seed, options}.readings();
+    const std::vector<ImuReading> read =
+        ImuSimulator{walk, mounted_imu(), seed, options}.readings();
     for (const auto measured : {&ImuSample::accel_mps2, &ImuSample::gyro_radps}) {
       // The matrix that makes what is read of what is true, by least squares.
       Matrix3d read_by_true = Matrix3d::Zero();

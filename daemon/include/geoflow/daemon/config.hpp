@@ -83,6 +83,9 @@ struct PipelineConfig {
   int packet_queue = 4;     ///< packets that may wait for the estimator; one more drops the oldest
   int image_queue = 8;      ///< images of each kind that may wait for the synchroniser; likewise
   int sample_queue = 1024;  ///< IMU samples, and leg samples, that may wait for the synchroniser
+  int priority = 0;         ///< real-time, of the source's, synchroniser's and estimator's threads;
+                            ///< 0: none
+  bool lock_memory = false;  ///< what the daemon has in memory stays there
 };
 
 /// The map that outlives the daemon.

@@ -16,7 +16,7 @@ namespace geoflow::simulator {
 namespace {
 
 constexpr float kShortestHall_m =
-    24;  // longer than depth reaches, so that a flat wall's ends do not help
+    24;                        // longer than depth reaches, so that a flat wall's ends do not help
 constexpr float kStage_m = 9;  // of the middle of the hall is walked along
 constexpr float kPanelHeight_m = 1.8F;
 constexpr float kPi = std::numbers::pi_v<float>;
@@ -40,7 +40,8 @@ void add_zigzag(Builder builder, float length_m, int material, Random random) {
 
 /// What stands along a side of the lane, which lies towards -y: panels, a picture on the wall, or
 /// nothing.
-void add_side(Builder builder, float hall_m, const StructureCase& which, int material, Random random) {
+void add_side(Builder builder, float hall_m, const StructureCase& which, int material,
+              Random random) {
   if (which.structure) {
     const float length_m = kStage_m + 8.0F;
     add_zigzag(builder.at({0.5F * (hall_m - length_m), -0.05F, 0}), length_m, material, random);
@@ -67,7 +68,8 @@ void lay_out_structure(Builder builder, const StructureCase& which, Random rando
        .overlay = builder.texture(paint_stains(0.25F, random.fork("stains")), 4.3F)});
   const float distance = which.near ? random.uniform(0.9F, 1.1F) : random.uniform(2.0F, 2.4F);
   const float hall_m = random.uniform(kShortestHall_m, kShortestHall_m + 4.0F);
-  // A lane between two like sides: one is before the camera wherever the path, which winds from one to the other, leads.
+  // A lane between two like sides: one is before the camera wherever the path, which winds from one
+  // to the other, leads.
   const float sway = which.near ? 0.45F : 0.8F;
   const float reach = which.structure ? 0.65F : 0.05F;
   const float middle = reach + distance + sway;
