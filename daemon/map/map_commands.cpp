@@ -32,6 +32,10 @@ nlohmann::json describe(const MapReport& report) {
               {"bytes", report.bytes}};
     case MapJob::kForget:
       return {{"moved", report.moved.string()}};
+    case MapJob::kLoad:
+      return {{"loaded", report.file.string()},
+              {"moved", report.moved.string()},
+              {"keyframes", report.keyframes}};
     case MapJob::kRestart:
       break;
   }
@@ -40,10 +44,10 @@ nlohmann::json describe(const MapReport& report) {
 
 }  // namespace
 
-void MapCommands::ask(MapJob job, const Asker& asker, HostTime now) {
-  auto waiting = std::ranges::find(queue_, job, &Request::job);
+void MapCommands::ask(const MapOrder& order, const Asker& asker, HostTime now) {
+  auto waiting = std::ranges::find(queue_, order, &Request::order);
   if (waiting == queue_.end()) {
-    waiting = queue_.insert(queue_.end(), Request{.job = job, .since = now, .askers = {}});
+    waiting = queue_.insert(queue_.end(), Request{.order = order, .since = now, .askers = {}});
   }
   if (waiting->askers.size() >= kMostAskers) {
     answer_(asker, fail(ErrorCode::kUnavailable, "too many ask for this"));
@@ -73,16 +77,16 @@ void MapCommands::turn(MapKeeper* keeper, Duration interval, HostTime now) {
   }
   tried_at_ = tried_at_.value_or(now);
   if (interval > Duration::zero() && now - *tried_at_ >= interval && keeper->has_news()) {
-    begin(*keeper, {.job = MapJob::kSave, .since = now, .askers = {}}, now);
+    begin(*keeper, {.order = {.job = MapJob::kSave}, .since = now, .askers = {}}, now);
   }
 }
 
 void MapCommands::begin(MapKeeper& keeper, Request request, HostTime now) {
-  if (request.job == MapJob::kSave) {
+  if (request.order.job == MapJob::kSave) {
     tried_at_ = now;
   }
   under_way_ = std::move(request);
-  if (const auto begun = keeper.begin(under_way_->job); !begun) {
+  if (const auto begun = keeper.begin(under_way_->order); !begun) {
     answer(tl::unexpected{begun.error()});
   }
 }

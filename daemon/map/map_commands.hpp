@@ -26,7 +26,7 @@ class MapCommands {
   explicit MapCommands(Answer answer) : answer_{std::move(answer)} {}
 
   /// Has a job done for a client; it is answered when that is done, or cannot be.
-  void ask(MapJob job, const Asker& asker, HostTime now);
+  void ask(const MapOrder& order, const Asker& asker, HostTime now);
   /// Goes on: takes what is done, begins what is due. `keeper` is null while there is no run; what
   /// is asked then waits for one for two seconds.
   /// `interval`: how often the map is saved; zero: not by the clock. To be called when the keeper
@@ -45,7 +45,7 @@ class MapCommands {
 
  private:
   struct Request {
-    MapJob job = MapJob::kSave;
+    MapOrder order;
     HostTime since;  // it was asked for
     std::vector<Asker> askers;
   };

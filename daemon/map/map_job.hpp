@@ -13,6 +13,15 @@ enum class MapJob : std::uint8_t {
   kSave,     ///< write it to its file
   kRestart,  ///< the estimator begins anew and looks for its place in the map as it is
   kForget,   ///< the file is moved aside, and the estimator begins with an empty map
+  kLoad,     ///< another file's map takes the place of this one, which is kept aside
+};
+
+/// A job to be done.
+struct MapOrder {
+  MapJob job = MapJob::kSave;
+  std::filesystem::path file{};  ///< of kLoad
+
+  bool operator==(const MapOrder&) const = default;
 };
 
 /// How far the estimator was at one time; where it has stayed, there is nothing new to save.
@@ -26,8 +35,8 @@ struct MapMark {
 /// What a job has done.
 struct MapReport {
   MapJob job = MapJob::kSave;
-  std::filesystem::path file{};   ///< that was written or moved; empty: none
-  std::filesystem::path moved{};  ///< to where it was moved; empty: it was not
+  std::filesystem::path file{};   ///< that was written or loaded; empty: none
+  std::filesystem::path moved{};  ///< where the map of before is kept; empty: there was none
   std::size_t keyframes = 0;      ///< in the map
   std::uintmax_t bytes = 0;       ///< of the written file
   MapMark mark{};                 ///< of what was saved

@@ -1,7 +1,6 @@
 #include "map/map_keeper.hpp"
 
 #include <atomic>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -23,6 +22,7 @@
 #include "geoflow/slam/saved_map.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
+#include "map/map_files.hpp"
 #include "map/map_job.hpp"
 
 namespace geoflow::daemon {
@@ -84,27 +84,44 @@ void MapKeeper::stop() {
   }
 }
 
-Result<void> MapKeeper::begin(MapJob job) {
+Result<void> MapKeeper::begin(const MapOrder& order) {
   if (busy_) {
     return fail(ErrorCode::kUnavailable, "the map is being worked on");
   }
-  return (job == MapJob::kSave ? may_save() : Result<void>{}).map([&] {
+  return may_begin(order.job).map([&] {
     busy_ = true;
-    wanted_.store(1 + static_cast<int>(job), std::memory_order_release);
+    order_ = order;
+    wanted_.store(true, std::memory_order_release);
     wake_();
   });
 }
 
-Result<void> MapKeeper::may_save() const {
-  if (config_.map.file.empty()) {
-    return fail(ErrorCode::kInvalidArgument, "map.file: no file is configured");
+Result<void> MapKeeper::may_begin(MapJob job) const {
+  switch (job) {
+    case MapJob::kSave:
+      return may_save();
+    case MapJob::kLoad:
+      return has_file();
+    case MapJob::kRestart:
+    case MapJob::kForget:
+      break;
   }
+  return {};
+}
+
+Result<void> MapKeeper::has_file() const {
+  return config_.map.file.empty()
+             ? fail(ErrorCode::kInvalidArgument, "map.file: no file is configured")
+             : Result<void>{};
+}
+
+Result<void> MapKeeper::may_save() const {
   if (!file_is_ours_) {
     return fail(ErrorCode::kUnavailable,
                 "the map's file was refused at the start and is left as it is: {}",
                 run_.map_refused ? run_.map_refused->message : "");
   }
-  return {};
+  return has_file();
 }
 
 bool MapKeeper::has_news() const noexcept {
@@ -119,7 +136,7 @@ std::optional<MapOutcome> MapKeeper::take_outcome() {
   busy_ = false;
   if (outcome->report && outcome->job == MapJob::kSave) {
     saved_ = outcome->report->mark;
-  } else if (outcome->report && outcome->job == MapJob::kForget) {
+  } else if (outcome->report && outcome->job != MapJob::kRestart) {
     saved_.reset();
     file_is_ours_ = true;
   }
@@ -141,12 +158,9 @@ MapMark MapKeeper::mark() const noexcept {
 }
 
 bool MapKeeper::between_frames() {
-  if (const int wanted = wanted_.exchange(0, std::memory_order_acq_rel); wanted != 0) {
-    const auto job = static_cast<MapJob>(wanted - 1);
+  if (wanted_.exchange(false, std::memory_order_acq_rel)) {
     // One job is under way at a time, so there is room for its task, and later for its core.
-    (void)tasks_.try_push({.job = job,
-                           .map = job == MapJob::kForget ? nullptr : run_.core->snapshot(),
-                           .mark = mark()});
+    (void)tasks_.try_push({.map = run_.core->snapshot(), .mark = mark()});
     bell_.ring();
   }
   auto fresh = fresh_.try_pop();
@@ -186,8 +200,8 @@ void MapKeeper::work(const std::stop_token& stop) {
 }
 
 void MapKeeper::take(const Task& task) {
-  if (task.job == MapJob::kSave) {
-    finish(task.job, save(task));
+  if (order_.job == MapJob::kSave) {
+    finish(MapJob::kSave, save(task));
     return;
   }
   auto begun = begin_anew(task);
@@ -195,7 +209,7 @@ void MapKeeper::take(const Task& task) {
     waiting_ = std::move(*begun);
     wake_();
   } else {
-    finish(task.job, std::move(begun));
+    finish(order_.job, std::move(begun));
   }
 }
 
@@ -204,34 +218,51 @@ Result<MapReport> MapKeeper::save(const Task& task) const {
 }
 
 Result<MapReport> MapKeeper::begin_anew(const Task& task) {
-  auto report = task.job == MapJob::kForget
-                    ? move_file_aside()
-                    : Result<MapReport>{MapReport{.keyframes = slam::summary(*task.map).keyframes}};
-  return std::move(report).and_then([&](MapReport ready) {
-    ready.job = task.job;
-    return slam::Core::create(run_.calibration, config_.slam, &run_.statistics->tracking,
-                              task.map.get())
-        .map([&](std::unique_ptr<slam::Core> core) {
-          (void)fresh_.try_push(std::move(core));
-          return std::move(ready);
-        });
+  auto map = map_for(task);
+  if (!map) {
+    return tl::unexpected{std::move(map.error())};
+  }
+  auto core =
+      slam::Core::create(run_.calibration, config_.slam, &run_.statistics->tracking, map->get());
+  if (!core) {
+    return tl::unexpected{std::move(core.error())};
+  }
+  return put_aside(task, map->get()).map([&](const std::filesystem::path& moved) {
+    (void)fresh_.try_push(std::move(*core));
+    return MapReport{.job = order_.job,
+                     .file = order_.file,
+                     .moved = moved,
+                     .keyframes = *map ? slam::summary(**map).keyframes : 0};
   });
 }
 
-Result<MapReport> MapKeeper::move_file_aside() const {
-  const std::filesystem::path& file = config_.map.file;
-  std::error_code failure;
-  if (file.empty() || !std::filesystem::exists(file, failure)) {
-    return MapReport{};
+/// That the estimator is to begin with; null: an empty one.
+Result<std::shared_ptr<const slam::StoredMap>> MapKeeper::map_for(const Task& task) const {
+  switch (order_.job) {
+    case MapJob::kForget:
+      return nullptr;
+    case MapJob::kLoad:
+      return load_own_map(order_.file, run_.calibration);
+    case MapJob::kSave:
+    case MapJob::kRestart:
+      break;
   }
-  std::filesystem::path aside = file;
-  aside += ".old";
-  std::filesystem::rename(file, aside, failure);
-  if (failure) {
-    return fail(ErrorCode::kSystem, "{}: cannot be renamed to {}: {}", file.string(),
-                aside.string(), failure.message());
+  return task.map;
+}
+
+/// Where the map of before is to be found from now on, if that is another one.
+Result<std::filesystem::path> MapKeeper::put_aside(const Task& task,
+                                                   const slam::StoredMap* next) const {
+  switch (order_.job) {
+    case MapJob::kForget:
+      return move_aside(config_.map.file);
+    case MapJob::kLoad:
+      return replace_map(config_.map.file, *next, file_is_ours_ ? task.map.get() : nullptr);
+    case MapJob::kSave:
+    case MapJob::kRestart:
+      break;
   }
-  return MapReport{.file = file, .moved = aside};
+  return std::filesystem::path{};
 }
 
 void MapKeeper::finish(MapJob job, Result<MapReport> report) {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -46,8 +47,8 @@ class MapKeeper {
   [[nodiscard]] bool busy() const noexcept { return busy_; }
   /// Begins a job. Errors: kUnavailable while another one is under way, and where the map's file
   /// was refused and is not to be replaced; kInvalidArgument where a map without a file is to be
-  /// saved.
-  [[nodiscard]] Result<void> begin(MapJob job);
+  /// saved, or kept aside.
+  [[nodiscard]] Result<void> begin(const MapOrder& order);
   /// Of the job under way, once, when it is done.
   [[nodiscard]] std::optional<MapOutcome> take_outcome();
   /// After stop(): writes the map here and now, unless it was saved as it is. Nothing where there
@@ -65,8 +66,7 @@ class MapKeeper {
  private:
   /// What the estimator's thread hands to the keeper's.
   struct Task {
-    MapJob job = MapJob::kSave;
-    std::shared_ptr<const slam::StoredMap> map{};  // as it is; null for kForget
+    std::shared_ptr<const slam::StoredMap> map{};  // as it is
     MapMark mark{};
   };
 
@@ -76,10 +76,14 @@ class MapKeeper {
   void take(const Task& task);
   [[nodiscard]] Result<MapReport> save(const Task& task) const;
   [[nodiscard]] Result<MapReport> begin_anew(const Task& task);
-  [[nodiscard]] Result<MapReport> move_file_aside() const;
+  [[nodiscard]] Result<std::shared_ptr<const slam::StoredMap>> map_for(const Task& task) const;
+  [[nodiscard]] Result<std::filesystem::path> put_aside(const Task& task,
+                                                        const slam::StoredMap* next) const;
   void finish(MapJob job, Result<MapReport> report);
   [[nodiscard]] MapMark mark() const noexcept;
+  [[nodiscard]] Result<void> has_file() const;
   [[nodiscard]] Result<void> may_save() const;
+  [[nodiscard]] Result<void> may_begin(MapJob job) const;
 
   Run& run_;
   const Config& config_;
@@ -87,11 +91,12 @@ class MapKeeper {
   std::function<void()> wake_;
   timesync::Doorbell bell_;
   Pulse pulse_;
-  bool busy_ = false;                                          // owner
-  bool file_is_ours_;                                          // owner: it may be replaced
-  std::optional<MapMark> saved_;                               // owner
-  std::atomic<int> wanted_{0};                                 // owner -> estimator: 1 + MapJob
-  timesync::SpscRing<Task> tasks_{1};                          // estimator -> keeper
+  bool busy_ = false;                  // owner
+  bool file_is_ours_;                  // owner's but while busy: it may be replaced
+  MapOrder order_;                     // likewise: the job under way
+  std::optional<MapMark> saved_;       // owner
+  std::atomic<bool> wanted_{false};    // owner -> estimator: order_ is new
+  timesync::SpscRing<Task> tasks_{1};  // estimator -> keeper
   timesync::SpscRing<std::unique_ptr<slam::Core>> fresh_{1};   // keeper -> estimator
   timesync::SpscRing<std::unique_ptr<slam::Core>> former_{1};  // estimator -> keeper
   std::optional<MapReport> waiting_;                           // keeper: for former_

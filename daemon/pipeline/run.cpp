@@ -16,6 +16,8 @@
 #include "geoflow/slam/propagator.hpp"
 #include "geoflow/slam/saved_map.hpp"
 
+#include "map/map_files.hpp"
+
 namespace geoflow::daemon {
 namespace {
 
@@ -45,11 +47,7 @@ Result<std::shared_ptr<const slam::StoredMap>> saved_map(const MapConfig& config
   if (config.file.empty()) {
     return nullptr;
   }
-  return slam::load_map(config.file).and_then([&](auto map) {
-    return slam::made_with(*map, calibration).map([&] { return map; }).map_error([&](Error error) {
-      return std::move(error).in(config.file.string());
-    });
-  });
+  return load_own_map(config.file, calibration);
 }
 
 }  // namespace

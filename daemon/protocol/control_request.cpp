@@ -69,15 +69,32 @@ Result<WatchRequest> parse_watch(const json& object) {
   return WatchRequest{.rate_hz = rate_hz};
 }
 
-Result<Change> parse_map(const json& object) {
+Result<ChangeRequest> parse_load(const json& object) {
+  const auto file = object.find("file");
+  if (file == object.end() || !file->is_string()) {
+    return fail(ErrorCode::kInvalidArgument, "file: must be the path of a map");
+  }
+  ChangeRequest request{.change = Change::kLoadMap, .file = file->get<std::string>()};
+  if (!request.file.is_absolute()) {
+    return fail(ErrorCode::kInvalidArgument, "file: '{}' must be an absolute path",
+                request.file.string());
+  }
+  return request;
+}
+
+Result<ChangeRequest> parse_map(const json& object) {
   const auto what = object.find("do");
-  if (what != object.end() && *what == "save") {
-    return Change::kSaveMap;
+  const std::string word =
+      what != object.end() && what->is_string() ? what->get<std::string>() : std::string{};
+  if (word == "load") {
+    return only_keys(object, {"do", "file"}).and_then([&] { return parse_load(object); });
   }
-  if (what != object.end() && *what == "reset") {
-    return Change::kResetMap;
+  if (word == "save" || word == "reset") {
+    return only_keys(object, {"do"}).map([&] {
+      return ChangeRequest{.change = word == "save" ? Change::kSaveMap : Change::kResetMap};
+    });
   }
-  return fail(ErrorCode::kInvalidArgument, R"(do: must be "save" or "reset")");
+  return fail(ErrorCode::kInvalidArgument, R"(do: must be "save", "load" or "reset")");
 }
 
 using Command = decltype(ControlRequest::command);
@@ -90,11 +107,15 @@ Result<Command> parse_command(const json& object, const std::string& name) {
     });
   }
   if (name == "map") {
-    return only_keys(object, {"do"}).and_then([&] { return parse_map(object).map(as_command); });
+    return parse_map(object).map(as_command);
   }
   static const std::map<std::string, Command, std::less<>> plain = {
-      {"help", HelpRequest{}},     {"status", StatusRequest{}}, {"unwatch", UnwatchRequest{}},
-      {"config", ConfigRequest{}}, {"reset", Change::kReset},   {"reload", Change::kReload}};
+      {"help", HelpRequest{}},
+      {"status", StatusRequest{}},
+      {"unwatch", UnwatchRequest{}},
+      {"config", ConfigRequest{}},
+      {"reset", ChangeRequest{.change = Change::kReset}},
+      {"reload", ChangeRequest{.change = Change::kReload}}};
   const auto found = plain.find(name);
   if (found == plain.end()) {
     return fail(ErrorCode::kInvalidArgument,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,12 +27,19 @@ struct ConfigRequest {};
 enum class Change : std::uint8_t {
   kSaveMap,
   kResetMap,  ///< begin with an empty map
+  kLoadMap,   ///< begin anew in the map of a file
   kReset,     ///< begin anew in the map as it is
   kReload,    ///< read the configuration again
 };
 
+struct ChangeRequest {
+  Change change = Change::kSaveMap;
+  std::filesystem::path file{};  ///< of kLoadMap: an absolute path
+};
+
 struct ControlRequest {
-  std::variant<StatusRequest, HelpRequest, UnwatchRequest, WatchRequest, ConfigRequest, Change>
+  std::variant<StatusRequest, HelpRequest, UnwatchRequest, WatchRequest, ConfigRequest,
+               ChangeRequest>
       command;
   std::string name;   ///< the command's word
   nlohmann::json id;  ///< echoed in the reply; null where the client gave none

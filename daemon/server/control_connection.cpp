@@ -63,7 +63,8 @@ const json& help() {
       {"watch", "poses as they come; rate_hz (0 to 1000, 0 or none: every one), stream (\"pose\")"},
       {"unwatch", "ends watch"},
       {"config", "every key of the configuration with its value"},
-      {"map", R"(do ("save", "reset"): writes the map to its file now, or begins an empty one)"},
+      {"map",
+       R"(do ("save", "load" with file, "reset"): writes the map to its file now, takes another file's in its place, or begins an empty one)"},
       {"reset", "the estimator begins anew in the map as it is"},
       {"reload", "reads the configuration again; what cannot change at run time is named"}};
   return commands;
@@ -115,14 +116,15 @@ void ControlConnection::answer(std::string_view line, const Desk& desk) {
   const auto request = parse_control_request(line);
   if (!request) {
     say(error_reply(request.error()), desk.now);
-  } else if (const auto* change = std::get_if<Change>(&request->command)) {
+  } else if (const auto* change = std::get_if<ChangeRequest>(&request->command)) {
     begin(*change, *request, desk);
   } else {
     say(reply_to(*request, desk.handlers), desk.now);
   }
 }
 
-void ControlConnection::begin(Change change, const ControlRequest& request, const Desk& desk) {
+void ControlConnection::begin(const ChangeRequest& change, const ControlRequest& request,
+                              const Desk& desk) {
   const Asker asker{.client = number_, .name = request.name, .id = request.id};
   if (desk.authority.permits(connection_)) {
     log::info("server", "{} was asked for by process {}, user {}", request.name, connection_.pid,

@@ -31,7 +31,7 @@ struct ControlHandlers {
   std::function<nlohmann::json()> status;  ///< gives the status reply
   std::function<nlohmann::json()> config;  ///< gives every key with its value
   /// Begins a change; ControlServer::conclude() is to be called once, now or later.
-  std::function<void(Change, const Asker&)> change;
+  std::function<void(const ChangeRequest&, const Asker&)> change;
 };
 
 /// One client of the control socket: a line in, a line out, and poses while it watches. Its buffers
@@ -67,7 +67,7 @@ class ControlConnection {
     HostTime now;
   };
   void answer(std::string_view line, const Desk& desk);
-  void begin(Change change, const ControlRequest& request, const Desk& desk);
+  void begin(const ChangeRequest& change, const ControlRequest& request, const Desk& desk);
   [[nodiscard]] nlohmann::json reply_to(const ControlRequest& request,
                                         const ControlHandlers& handlers);
   [[nodiscard]] bool answer_lines(const Desk& desk);

@@ -107,12 +107,13 @@ class Daemon {
       poses_ = std::move(*server);
     }
     if (given.control || !config_.socket.control.empty()) {
-      auto server = ControlServer::create(
-          *loop_, config_.socket,
-          {.status = [this] { return status(); },
-           .config = [this] { return configuration(); },
-           .change = [this](Change change, const Asker& asker) { begin(change, asker); }},
-          std::move(given.control));
+      auto server =
+          ControlServer::create(*loop_, config_.socket,
+                                {.status = [this] { return status(); },
+                                 .config = [this] { return configuration(); },
+                                 .change = [this](const ChangeRequest& request,
+                                                  const Asker& asker) { begin(request, asker); }},
+                                std::move(given.control));
       if (!server) {
         return tl::unexpected{std::move(server.error())};
       }
@@ -196,20 +197,23 @@ class Daemon {
   }
 
   /// What a client asked for and may have.
-  void begin(Change change, const Asker& asker) {
+  void begin(const ChangeRequest& request, const Asker& asker) {
     const HostTime now = HostClock::now();
-    switch (change) {
+    switch (request.change) {
       case Change::kReload:
         control_->conclude(asker, reload());
         return;
       case Change::kSaveMap:
-        map_.ask(MapJob::kSave, asker, now);
+        map_.ask({.job = MapJob::kSave}, asker, now);
         break;
       case Change::kResetMap:
-        map_.ask(MapJob::kForget, asker, now);
+        map_.ask({.job = MapJob::kForget}, asker, now);
         break;
       case Change::kReset:
-        map_.ask(MapJob::kRestart, asker, now);
+        map_.ask({.job = MapJob::kRestart}, asker, now);
+        break;
+      case Change::kLoadMap:
+        map_.ask({.job = MapJob::kLoad, .file = request.file}, asker, now);
         break;
     }
     map_.turn(worker_->map(), running_.map.save_interval, now);

@@ -188,7 +188,8 @@ std::string to_string(SectionTag tag) {
 }
 
 Result<std::shared_ptr<const MapFile>> MapFile::open(const std::filesystem::path& path) {
-  UniqueFd fd{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  // What is no regular file must not be waited for.
+  UniqueFd fd{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (!fd) {
     return fail_errno(path.string());
   }

@@ -29,10 +29,11 @@ TEST(ControlRequest, CommandsAreParsed) {
 
 TEST(ControlRequest, ChangesAreParsed) {
   const auto change = [](const std::string& line) {
-    return std::get<Change>(parse_control_request(line).value().command);
+    return std::get<ChangeRequest>(parse_control_request(line).value().command).change;
   };
   EXPECT_EQ(change(R"({"cmd":"map","do":"save"})"), Change::kSaveMap);
   EXPECT_EQ(change(R"({"cmd":"map","do":"reset"})"), Change::kResetMap);
+  EXPECT_EQ(change(R"({"cmd":"map","do":"load","file":"/a.map"})"), Change::kLoadMap);
   EXPECT_EQ(change(R"({"cmd":"reset"})"), Change::kReset);
   EXPECT_EQ(change(R"({"cmd":"reload"})"), Change::kReload);
 }
@@ -59,14 +60,18 @@ TEST(ControlRequest, ErrorsSayWhatIsWrong) {
 }
 
 TEST(ControlRequest, ErrorsNameTheKey) {
-  expect_errors({{R"({"cmd":"status","rate_hz":1})", "unknown key \"rate_hz\""},
-                 {R"({"cmd":"watch","stream":"cloud"})", "stream"},
-                 {R"({"cmd":"watch","rate_hz":-1})", "rate_hz"},
-                 {R"({"cmd":"watch","rate_hz":"fast"})", "rate_hz"},
-                 {R"({"cmd":"map"})", "do: must be \"save\" or \"reset\""},
-                 {R"({"cmd":"map","do":"burn"})", "do: must be"},
-                 {R"({"cmd":"map","do":"save","file":"x"})", "unknown key \"file\""},
-                 {R"({"cmd":"reset","do":"save"})", "unknown key \"do\""}});
+  expect_errors(
+      {{R"({"cmd":"status","rate_hz":1})", "unknown key \"rate_hz\""},
+       {R"({"cmd":"watch","stream":"cloud"})", "stream"},
+       {R"({"cmd":"watch","rate_hz":-1})", "rate_hz"},
+       {R"({"cmd":"watch","rate_hz":"fast"})", "rate_hz"},
+       {R"({"cmd":"map"})", "do: must be \"save\", \"load\" or \"reset\""},
+       {R"({"cmd":"map","do":"burn"})", "do: must be"},
+       {R"({"cmd":"map","do":"save","file":"x"})", "unknown key \"file\""},
+       {R"({"cmd":"map","do":"load"})", "file: must be the path of a map"},
+       {R"({"cmd":"map","do":"load","file":7})", "file: must be the path of a map"},
+       {R"({"cmd":"map","do":"load","file":"a.map"})", "'a.map' must be an absolute path"},
+       {R"({"cmd":"reset","do":"save"})", "unknown key \"do\""}});
 }
 
 TEST(ControlRequest, DepthAndLengthAreBounded) {

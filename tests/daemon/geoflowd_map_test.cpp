@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "geoflow/daemon/control_client.hpp"
 #include "geoflow/hal/result.hpp"
@@ -76,6 +77,9 @@ class GeoflowdMapTest : public testing::Test {
   static json ask(ControlClient& client, const json& request) {
     auto reply = client.request(request, kPatience);
     return reply ? *reply : json{{"failed", reply.error().message}};
+  }
+  static json load(ControlClient& client, const std::filesystem::path& file) {
+    return ask(client, {{"cmd", "map"}, {"do", "load"}, {"file", file.string()}});
   }
   static json status(ControlClient& client) {
     return ask(client, {{"cmd", "status"}}).value("status", json::object());
@@ -207,12 +211,81 @@ TEST_F(GeoflowdMapTest, AResetBeginsAnewInTheMapAndAMapResetWithoutOne) {
   EXPECT_EQ(process.wait(kPatience), 0) << process.err();
 }
 
+TEST_F(GeoflowdMapTest, ALoadGoesOnInAnotherFilesMapAndKeepsTheFormerOneAside) {
+  const std::filesystem::path other = path() / "other.map";
+  const std::filesystem::path aside = map_.string() + ".old";
+  Process process{daemon_with_map({"--set", "map.save_interval_s=0"}), path() / "log"};
+  ControlClient client = connect();
+  wait_for_mapping(client);
+  ASSERT_EQ(ask(client, {{"cmd", "map"}, {"do", "save"}})["saved"], map_.string());
+  std::filesystem::rename(map_, other);
+  const std::size_t saved = keyframes(other);
+  const auto resets = status(client)["pose"]["reset_counter"].get<std::uint64_t>();
+
+  const json loaded = load(client, other);
+  EXPECT_EQ(loaded["loaded"], other.string()) << loaded;
+  EXPECT_EQ(loaded["moved"], aside.string());
+  EXPECT_EQ(loaded["keyframes"], saved);
+  EXPECT_EQ(keyframes(map_), saved);
+  EXPECT_EQ(keyframes(other), saved);
+  const std::size_t former = keyframes(aside);  // as it was then, whether it had been saved or not
+  EXPECT_GE(former, saved);
+  wait_until([&] { return status(client)["pose"]["reset_counter"] > resets; }, "the new start");
+  wait_until([&] { return status(client)["pose"]["status"] == "TRACKING"; },
+             "its place in the map");
+
+  // The way back.
+  const json back = load(client, aside);
+  EXPECT_EQ(back["keyframes"], former) << back;
+  EXPECT_EQ(keyframes(map_), former);
+  EXPECT_GE(keyframes(aside), saved);
+  process.send_signal(SIGTERM);
+  EXPECT_EQ(process.wait(kPatience), 0) << process.err();
+  EXPECT_GE(keyframes(map_), former);
+}
+
+TEST_F(GeoflowdMapTest, AMapThatCannotBeLoadedIsRefusedWithTheReasonAndNothingChanges) {
+  Process process{daemon_with_map({"--set", "map.save_interval_s=0"}), path() / "log"};
+  ControlClient client = connect();
+  wait_for_mapping(client);
+  ASSERT_EQ(ask(client, {{"cmd", "map"}, {"do", "save"}})["saved"], map_.string());
+  const auto written = std::filesystem::last_write_time(map_);
+  const std::uint64_t resets = status(client)["pose"]["reset_counter"].get<std::uint64_t>();
+  const auto refused = [&](const std::filesystem::path& file) {
+    return load(client, file).value("failed", "");
+  };
+  EXPECT_THAT(refused(GEOFLOW_SMALL_MAP), HasSubstr("small.map: the map was made with"));
+
+  const std::filesystem::path damaged = path() / "damaged.map";
+  std::filesystem::copy(map_, damaged);
+  {  // in the depth, which is not read with the rest
+    std::fstream file{damaged, std::ios::in | std::ios::out | std::ios::binary};
+    file.seekp(static_cast<std::streamoff>(std::filesystem::file_size(damaged) - 1000));
+    file << "damage";
+  }
+  EXPECT_THAT(refused(damaged), HasSubstr("damaged.map: section "));
+  std::filesystem::resize_file(damaged, 1000);
+  EXPECT_THAT(refused(damaged), HasSubstr("damaged.map"));
+  ASSERT_EQ(::mkfifo((path() / "fifo").c_str(), 0600), 0);
+  EXPECT_THAT(refused(path() / "fifo"), HasSubstr("not a regular file"));
+  EXPECT_THAT(refused(path() / "nothing.map"), HasSubstr("nothing.map: No such file"));
+
+  EXPECT_EQ(std::filesystem::last_write_time(map_), written);
+  EXPECT_FALSE(std::filesystem::exists(map_.string() + ".old"));
+  EXPECT_FALSE(std::filesystem::exists(map_.string() + ".new"));
+  EXPECT_EQ(status(client)["pose"]["reset_counter"], resets);
+  process.send_signal(SIGTERM);
+  EXPECT_EQ(process.wait(kPatience), 0) << process.err();
+}
+
 TEST_F(GeoflowdMapTest, WithoutAFileOrASourceThereIsNothingToSave) {
   {
     Process process{daemon({}), path() / "log"};
     ControlClient client = connect();
     wait_for_mapping(client);
     EXPECT_THAT(ask(client, {{"cmd", "map"}, {"do", "save"}}).value("failed", ""),
+                HasSubstr("map.file: no file is configured"));
+    EXPECT_THAT(load(client, "/a.map").value("failed", ""),
                 HasSubstr("map.file: no file is configured"));
   }
   std::filesystem::remove(control_);

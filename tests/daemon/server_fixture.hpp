@@ -58,12 +58,13 @@ class ServerTest : public testing::Test {
     config_.clients = 4;
     loop_ = EventLoop::create().value();
     poses_ = PoseServer::create(*loop_, config_, GEOFLOW_CLOCK_REPLAY).value();
-    control_ = ControlServer::create(
-                   *loop_, config_,
-                   {.status = [] { return nlohmann::json{{"state", "fine"}}; },
-                    .config = [] { return nlohmann::json{{"map.file", "\"\""}}; },
-                    .change = [this](Change change,
-                                     const Asker& asker) { changes_.emplace_back(change, asker); }})
+    control_ = ControlServer::create(*loop_, config_,
+                                     {.status = [] { return nlohmann::json{{"state", "fine"}}; },
+                                      .config = [] { return nlohmann::json{{"map.file", "\"\""}}; },
+                                      .change =
+                                          [this](const ChangeRequest& request, const Asker& asker) {
+                                            changes_.emplace_back(request.change, asker);
+                                          }})
                    .value();
     ASSERT_TRUE(loop_->add_timer(std::chrono::milliseconds{20}, [this] {
       poses_->check_timeouts();

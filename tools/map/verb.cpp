@@ -38,15 +38,16 @@ constexpr std::string_view kExamples =
                                                             points, and keyframes as TUM text
   geoflow map ls /var/lib/geoflow                           the maps in a folder
   geoflow map save                                          the running daemon's, now
+  geoflow map load office.map                               the running daemon goes on in that map
   geoflow map reset                                         the running daemon begins an empty one
 A map is made by geoflow replay --save-map or by geoflowd (key map.file). Its format: docs/map-file.md.)";
 
-/// `geoflow map info|export MAP`, `geoflow map ls [FOLDER]`, `geoflow map save|reset`.
+/// `geoflow map info|export MAP`, `geoflow map ls [FOLDER]`, `geoflow map save|load MAP|reset`.
 class MapVerb final : public Verb {
  public:
   [[nodiscard]] std::string_view name() const override { return "map"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "Look at saved maps, export what they hold; save or reset the running daemon's";
+    return "Look at saved maps, export what they hold; save, load or reset the running daemon's";
   }
   [[nodiscard]] std::string_view examples() const override { return kExamples; }
 
