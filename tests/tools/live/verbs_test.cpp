@@ -30,6 +30,7 @@ using geoflow::tests::run_process;
 using geoflow::tests::TemporaryDirectory;
 using nlohmann::json;
 using std::chrono::seconds;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -97,8 +98,14 @@ class LiveVerbs : public testing::Test {
 };
 
 TEST_F(LiveVerbs, WithoutADaemonTheCodeIsFour) {
-  for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-           {"status"}, {"top"}, {"watch"}, {"reset"}, {"map", "save"}, {"map", "reset"}}) {
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"status"},
+                                             {"top"},
+                                             {"watch"},
+                                             {"reset"},
+                                             {"map", "save"},
+                                             {"map", "load", "x"},
+                                             {"map", "reset"}}) {
     const Finished finished = geoflow(words);
     EXPECT_EQ(finished.code, 4) << words.front();
     EXPECT_THAT(finished.err, HasSubstr("ctl.sock: no such socket; is geoflowd running?"));
@@ -140,7 +147,7 @@ TEST_F(LiveVerbs, TellHowTheDaemonIs) {
   EXPECT_GT(rates["rates"]["sources"]["camera"], 0.0);
 }
 
-TEST_F(LiveVerbs, SaveListAndResetTheMap) {
+TEST_F(LiveVerbs, SaveListResetAndLoadTheMap) {
   std::filesystem::create_directory(map_.parent_path());
   start_daemon();
   const json saved = object({"map", "save", "--json"});
@@ -159,6 +166,13 @@ TEST_F(LiveVerbs, SaveListAndResetTheMap) {
   EXPECT_GT(object({"reset", "--json"})["keyframes"], 0);
   EXPECT_THAT(geoflow({"map", "reset"}).out, HasSubstr(map_.string() + ".old"));
   EXPECT_TRUE(std::filesystem::exists(map_.string() + ".old"));
+
+  const json loaded =
+      object({"map", "load", "--json", std::filesystem::relative(map_.string() + ".old").string()});
+  EXPECT_THAT(loaded["loaded"].get<std::string>(), EndsWith("test.map.old"));
+  EXPECT_GE(loaded["keyframes"], saved["keyframes"]);
+  EXPECT_THAT(geoflow({"map", "load", (map_.parent_path() / "damaged.map").string()}).err,
+              HasSubstr("damaged.map"));
 }
 
 TEST_F(LiveVerbs, MapLsOfNoFolderIsAnError) {
