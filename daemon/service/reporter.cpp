@@ -48,6 +48,7 @@ bool Reporter::is_due(HostTime now) const noexcept {
 }
 
 void Reporter::tell(const Observation& seen, HostTime now) {
+  changes_.note(seen, now);
   std::string line = line_.update(seen, now);
   if (!stuck_.empty()) {
     line = fmt::format("thread {} is stuck; {}", stuck_, line);

@@ -7,6 +7,7 @@
 #include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "service/change_log.hpp"
 #include "service/status_line.hpp"
 #include "service/watchdog.hpp"
 
@@ -24,7 +25,7 @@ class Reporter {
   void watch(std::span<const ThreadActivity> threads, HostTime now);
   /// Whether it is time for tell(): once a second.
   [[nodiscard]] bool is_due(HostTime now) const noexcept;
-  /// Tells how the daemon is, if that has changed.
+  /// Tells how the daemon is, if that has changed; the log, too.
   void tell(const Observation& seen, HostTime now);
   /// The configuration is being read again, and, later, has been.
   void reloading();
@@ -37,6 +38,7 @@ class Reporter {
  private:
   Watchdog watchdog_;
   StatusLine line_;
+  ChangeLog changes_;
   std::string stuck_;  // name of a thread
   std::string told_;
   std::optional<HostTime> told_at_;

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "geoflow/daemon/words.hpp"
 #include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
 
@@ -47,6 +50,29 @@ const SourceWatch::Count& SourceWatch::count(const SourceReport& source, HostTim
   return *known;
 }
 
+std::string describe(const WatchedSource& source) {
+  const SourceHealth& health = source.health;
+  const std::string name = source.name == "imu" ? "IMU" : source.name;
+  const std::string reason = health.reason.empty() ? "" : fmt::format(" ({})", health.reason);
+  if (source.silent) {
+    return fmt::format("{} silent {}{}", name, in_words(*source.silent), reason);
+  }
+  switch (health.state) {
+    case SourceState::kDegraded:
+      return fmt::format("{} degraded{}", name, reason);
+    case SourceState::kFailed:
+      return fmt::format("{} failed{}", name, reason);
+    case SourceState::kStopped:
+    case SourceState::kStreaming:
+      break;
+  }
+  return name + " ok";
+}
+
+std::string state_name(const WatchedSource& source) {
+  return source.silent ? "silent" : name_of(source.health.state);
+}
+
 void SourceWatch::look(const std::vector<SourceReport>& sources, HostTime now) {
   sources_.clear();
   for (const SourceReport& source : sources) {
@@ -61,9 +87,10 @@ void SourceWatch::look(const std::vector<SourceReport>& sources, HostTime now) {
 
 nlohmann::json to_json(const std::vector<WatchedSource>& sources) {
   nlohmann::json all = nlohmann::json::object();
-  for (const auto& [name, health, since_sample, silent] : sources) {
+  for (const WatchedSource& source : sources) {
+    const auto& [name, health, since_sample, silent] = source;
     all[name] = {
-        {"state", silent ? "silent" : name_of(health.state)},
+        {"state", state_name(source)},
         {"last_sample_s", since_sample ? nlohmann::json(to_seconds(*since_sample)) : nullptr},
         {"reason", health.reason},
         {"delivered", health.delivered},

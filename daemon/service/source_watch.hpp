@@ -50,7 +50,12 @@ class SourceWatch {
   std::vector<WatchedSource> sources_;
 };
 
-/// For the status reply: name to `state` (the driver's, or silent), `last_sample_s` ago, `reason`
+/// In words, as in `IMU ok` and `legs silent 2 s (no interface can0)`.
+[[nodiscard]] std::string describe(const WatchedSource& source);
+/// The driver's state, or silent.
+[[nodiscard]] std::string state_name(const WatchedSource& source);
+
+/// For the status reply: name to `state` (state_name()), `last_sample_s` ago, `reason`
 /// and the counters.
 [[nodiscard]] nlohmann::json to_json(const std::vector<WatchedSource>& sources);
 

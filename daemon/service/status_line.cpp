@@ -10,7 +10,6 @@
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/words.hpp"
-#include "geoflow/hal/ports.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "service/source_watch.hpp"
@@ -19,26 +18,6 @@ namespace geoflow::daemon::service {
 namespace {
 
 constexpr Duration kRateWindow = std::chrono::seconds{3};
-
-/// As in `legs silent 2 s (no interface can0)`.
-std::string describe(const WatchedSource& source) {
-  const SourceHealth& health = source.health;
-  const std::string name = source.name == "imu" ? "IMU" : source.name;
-  const std::string reason = health.reason.empty() ? "" : fmt::format(" ({})", health.reason);
-  if (source.silent) {
-    return fmt::format("{} silent {}{}", name, in_words(*source.silent), reason);
-  }
-  switch (health.state) {
-    case SourceState::kDegraded:
-      return fmt::format("{} degraded{}", name, reason);
-    case SourceState::kFailed:
-      return fmt::format("{} failed{}", name, reason);
-    case SourceState::kStopped:
-    case SourceState::kStreaming:
-      break;
-  }
-  return name + " ok";
-}
 
 }  // namespace
 

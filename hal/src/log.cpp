@@ -32,7 +32,7 @@ Sink& custom_sink() {
 
 /// Whether stderr still is the journal's stream that $JOURNAL_STREAM names (systemd.exec(5)): the
 /// variable is inherited by what is started from there with another stderr, such as a terminal.
-bool stderr_is_journal() {
+bool is_journal_stream() {
   const char* named =
       std::getenv("JOURNAL_STREAM");  // NOLINT(concurrency-mt-unsafe): never set here
   struct stat status{};
@@ -40,18 +40,27 @@ bool stderr_is_journal() {
          fmt::format("{}:{}", status.st_dev, status.st_ino) == named;
 }
 
-void write_stderr(Level level, std::string_view category, std::string_view message) {
-  constexpr std::array<int, 4> kSyslogPriority = {3, 4, 6, 7};
-  constexpr std::array<std::string_view, 4> kName = {"error", "warning", "info", "debug"};
-  static const bool journal = stderr_is_journal();
-  const auto index = static_cast<std::size_t>(level);
-  const std::string line =
-      journal ? fmt::format("<{}>{}: {}\n", kSyslogPriority.at(index), category, message)
-              : fmt::format("{} {}: {}\n", kName.at(index), category, message);
-  std::fwrite(line.data(), 1, line.size(), stderr);
+}  // namespace
+
+bool stderr_is_journal() {
+  static const bool journal = is_journal_stream();
+  return journal;
 }
 
-}  // namespace
+int syslog_priority(Level level) noexcept {
+  constexpr std::array<int, 4> kPriority = {3, 4, 6, 7};
+  return kPriority.at(static_cast<std::size_t>(level));
+}
+
+void write_to_stderr(const Line& line) {
+  constexpr std::array<std::string_view, 4> kName = {"error", "warning", "info", "debug"};
+  const std::string text =
+      stderr_is_journal()
+          ? fmt::format("<{}>{}: {}\n", syslog_priority(line.level), line.category, line.message)
+          : fmt::format("{} {}: {}\n", kName.at(static_cast<std::size_t>(line.level)),
+                        line.category, line.message);
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
 
 void set_sink(Sink sink) {
   const std::lock_guard lock{sink_mutex()};
@@ -66,12 +75,12 @@ bool enabled(Level level) noexcept {
   return level <= maximum_level.load(std::memory_order_relaxed);
 }
 
-void write(Level level, std::string_view category, std::string_view message) {
+void write(const Line& line) {
   const std::lock_guard lock{sink_mutex()};
   if (custom_sink()) {
-    custom_sink()(level, category, message);
+    custom_sink()(line);
   } else {
-    write_stderr(level, category, message);
+    write_to_stderr(line);
   }
 }
 

@@ -196,27 +196,5 @@ TEST_F(GeoflowdService, ComesUpAgainAfterItWasKilled) {
   }
 }
 
-TEST_F(GeoflowdService, LogsWithPrioritiesWhereStderrIsTheJournal) {
-  const auto journal_of = [](const std::filesystem::path& file) {
-    struct stat status{};
-    EXPECT_EQ(::stat(file.c_str(), &status), 0);
-    return "JOURNAL_STREAM=" + std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino);
-  };
-  const auto log_with = [&](const std::string& name, const std::string& journal) {
-    Process process{daemon({journal}, absent_camera()), log(name)};
-    EXPECT_TRUE(manager_.wait_for("READY=1")) << process.err();
-    process.send_signal(SIGTERM);
-    EXPECT_EQ(process.wait(seconds{60}), 0);
-    return process.err();
-  };
-  std::ofstream{log("journal.err")} << "";
-  const std::string in_journal = log_with("journal", journal_of(log("journal.err")));
-  EXPECT_THAT(in_journal, StartsWith("<"));
-  EXPECT_THAT(in_journal, HasSubstr("<6>daemon: stopping on signal 15"));
-  const std::string elsewhere = log_with("elsewhere", journal_of(log("journal.err")));
-  EXPECT_THAT(elsewhere, HasSubstr("info daemon: stopping on signal 15"));
-  EXPECT_THAT(elsewhere, Not(HasSubstr("<6>")));
-}
-
 }  // namespace
 }  // namespace geoflow::daemon

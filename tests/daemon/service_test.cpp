@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <cstdlib>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -24,6 +24,7 @@
 
 #include "notify_socket.hpp"
 #include "pipeline/pulse.hpp"
+#include "service/change_log.hpp"
 #include "service/given_sockets.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
@@ -252,10 +253,37 @@ TEST(ReporterTest, SpeaksTheManagersProtocol) {
                                               "WATCHDOG=1", "STOPPING=1\nSTATUS=stopping"));
 }
 
+TEST(ChangeLogTest, TellsStatusAndSourcesWhenTheyChangeWithFieldsForPrograms) {
+  std::vector<std::string> lines;
+  log::set_sink([&](const log::Line& line) {
+    lines.push_back(line.level == log::Level::kWarning ? "warning " : "");
+    lines.back() += line.message;
+    for (const auto& [name, value] : line.fields) {
+      lines.back() += fmt::format(" {}={}", name, value);
+    }
+  });
+  ChangeLog changes;
+  WatchedSource legs{.name = "legs", .health = streaming("legs", 1).health};
+  geoflow_pose pose = tracking();
+  changes.note({.sources = {legs}}, at({}));
+  changes.note({.pose = pose, .sources = {legs}}, at(seconds{1}));
+  changes.note({.pose = pose, .sources = {legs}}, at(seconds{2}));
+  pose.status = GEOFLOW_LOST;
+  legs.silent = seconds{2};
+  changes.note({.pose = pose, .sources = {legs}}, at(seconds{4}));
+  legs.silent = seconds{3};
+  changes.note({.pose = pose, .sources = {legs}}, at(seconds{5}));
+  log::set_sink({});
+  EXPECT_THAT(lines,
+              ElementsAre("legs ok GEOFLOW_SENSOR=legs GEOFLOW_STATE=streaming",
+                          "TRACKING GEOFLOW_STATUS=TRACKING",
+                          "warning LOST, after 3 s of TRACKING GEOFLOW_STATUS=LOST",
+                          "warning legs silent 2 s GEOFLOW_SENSOR=legs GEOFLOW_STATE=silent"));
+}
+
 TEST(NotifyTest, AManagerThatIsNotThereIsNotedOnce) {
   std::vector<std::string> lines;
-  log::set_sink(
-      [&](log::Level, std::string_view, std::string_view message) { lines.emplace_back(message); });
+  log::set_sink([&](const log::Line& line) { lines.emplace_back(line.message); });
   const Variable variable{"NOTIFY_SOCKET", "/nonexistent/notify"};
   notify_ready("STARTING");
   notify_watchdog();

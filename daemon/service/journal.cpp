@@ -1,0 +1,46 @@
+#include "service/journal.hpp"
+
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+#include <sys/uio.h>
+
+#include "geoflow/hal/log.hpp"
+
+// Not the place of this call, which is the same for all lines.
+#define SD_JOURNAL_SUPPRESS_LOCATION
+#include <systemd/sd-journal.h>
+
+namespace geoflow::daemon::service {
+namespace {
+
+/// Whether the journal has taken the line.
+bool send(const log::Line& line) {
+  std::vector<std::string> fields = {fmt::format("MESSAGE={}: {}", line.category, line.message),
+                                     fmt::format("PRIORITY={}", log::syslog_priority(line.level)),
+                                     "SYSLOG_IDENTIFIER=geoflowd",
+                                     fmt::format("GEOFLOW_CATEGORY={}", line.category)};
+  for (const auto& [name, value] : line.fields) {
+    fields.push_back(fmt::format("{}={}", name, value));
+  }
+  std::vector<iovec> parts;
+  for (std::string& field : fields) {
+    parts.push_back({.iov_base = field.data(), .iov_len = field.size()});
+  }
+  return ::sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) == 0;
+}
+
+}  // namespace
+
+void log_to_journal() {
+  if (log::stderr_is_journal()) {
+    log::set_sink([](const log::Line& line) {
+      if (!send(line)) {
+        log::write_to_stderr(line);
+      }
+    });
+  }
+}
+
+}  // namespace geoflow::daemon::service
