@@ -1,12 +1,15 @@
-#define _GNU_SOURCE /* SOCK_CLOEXEC */
+#define _GNU_SOURCE /* SOCK_CLOEXEC, F_GET_SEALS */
 #include "geoflow_client.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -68,11 +71,19 @@ void geoflow_make_hello(const struct geoflow_options* options, unsigned char rec
 }
 
 /* One datagram: its size, 0 where the daemon has closed, -1 with errno, -2 where none came in time.
- */
-static ssize_t receive(int fd, unsigned char* record, int timeout_ms) {
+ * A descriptor that came with it is the caller's, in *passed; else that is -1. */
+static ssize_t receive(int fd, unsigned char* record, int timeout_ms, int* passed) {
+  union {
+    struct cmsghdr header;
+    char space[CMSG_SPACE(sizeof(int))];
+  } control;
+  struct iovec part;
+  struct msghdr message;
+  struct cmsghdr* header = NULL;
   struct pollfd waiting;
   int ready = 0;
   ssize_t size = 0;
+  *passed = -1;
   waiting.fd = fd;
   waiting.events = POLLIN;
   waiting.revents = 0;
@@ -80,8 +91,28 @@ static ssize_t receive(int fd, unsigned char* record, int timeout_ms) {
   if (ready == 0 || (ready < 0 && errno == EINTR)) {
     return -2;
   }
-  size = ready < 0 ? -1 : recv(fd, record, GEOFLOW_MAX_RECORD, 0);
-  return size < 0 && errno == ECONNRESET ? 0 : size;
+  part.iov_base = record;
+  part.iov_len = GEOFLOW_MAX_RECORD;
+  memset(&message, 0, sizeof message);
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.space;
+  message.msg_controllen = sizeof control.space;
+  size = ready < 0 ? -1 : recvmsg(fd, &message, MSG_CMSG_CLOEXEC);
+  if (size < 0) {
+    return errno == ECONNRESET ? 0 : size;
+  }
+  header = CMSG_FIRSTHDR(&message);
+  if (header != NULL && header->cmsg_level == SOL_SOCKET && header->cmsg_type == SCM_RIGHTS) {
+    memcpy(passed, CMSG_DATA(header), sizeof *passed);
+  }
+  return size;
+}
+
+static void close_if_open(int fd) {
+  if (fd >= 0) {
+    close(fd);
+  }
 }
 
 static int shake_hands(struct geoflow_client* client, const struct geoflow_options* options) {
@@ -89,12 +120,14 @@ static int shake_hands(struct geoflow_client* client, const struct geoflow_optio
   struct geoflow_header header;
   struct geoflow_refuse refuse;
   ssize_t size = 0;
+  int passed = -1;
   geoflow_make_hello(options, record);
   /* A daemon that refuses may have shut its end already; its reason can still be read. */
   if (send(client->fd, record, 72, MSG_NOSIGNAL) < 0 && errno != EPIPE) {
     return fail(client, "HELLO cannot be sent: %s", strerror(errno));
   }
-  size = receive(client->fd, record, HANDSHAKE_TIMEOUT_MS);
+  size = receive(client->fd, record, HANDSHAKE_TIMEOUT_MS, &passed);
+  close_if_open(passed);
   if (size == -1) {
     return fail(client, "the daemon's answer cannot be read: %s", strerror(errno));
   }
@@ -140,13 +173,117 @@ int geoflow_connect(struct geoflow_client* client, const struct geoflow_options*
   return -1;
 }
 
-enum geoflow_received geoflow_next_pose(struct geoflow_client* client, struct geoflow_pose* pose,
-                                        int timeout_ms) {
-  for (;;) {
+static void unmap(struct geoflow_mapped_ring* ring) {
+  if (ring->memory != NULL) {
+    munmap((void*)(uintptr_t)ring->memory, ring->about.bytes);
+    ring->memory = NULL;
+  }
+}
+
+/* Whether the ring is as it says, and stays so: what could shrink would end its reader. */
+static int is_sound(const struct geoflow_ring* ring, int fd) {
+  struct stat status;
+  const int seals = fcntl(fd, F_GET_SEALS);
+  return seals >= 0 && (seals & F_SEAL_SHRINK) != 0 && fstat(fd, &status) == 0 &&
+         (uint64_t)status.st_size >= ring->bytes && ring->slots > 0 &&
+         ring->slot_bytes > sizeof(struct geoflow_slot) && ring->slot_bytes % 8 == 0 &&
+         ring->slot_bytes <= ring->bytes / ring->slots;
+}
+
+/* A ring of a stream that this version does not know is left alone. */
+static int map_ring(struct geoflow_client* client, const struct geoflow_ring* about, int fd) {
+  struct geoflow_mapped_ring* ring = NULL;
+  void* memory = NULL;
+  if (about->stream < 1 || about->stream > GEOFLOW_STREAMS) {
+    return 0;
+  }
+  if (fd < 0 || !is_sound(about, fd)) {
+    return fail(client, "the daemon's memory for frames is not as it says");
+  }
+  memory = mmap(NULL, about->bytes, PROT_READ, MAP_SHARED, fd, 0);
+  if (memory == MAP_FAILED) {
+    return fail(client, "the daemon's memory for frames cannot be mapped: %s", strerror(errno));
+  }
+  ring = &client->rings[about->stream - 1];
+  unmap(ring);
+  ring->about = *about;
+  ring->memory = memory;
+  return 0;
+}
+
+/* The slot of a frame that came; NULL where its ring is not there. */
+static const unsigned char* slot_of(const struct geoflow_client* client,
+                                    const struct geoflow_frame* frame) {
+  const struct geoflow_mapped_ring* ring = NULL;
+  if (frame->stream < 1 || frame->stream > GEOFLOW_STREAMS) {
+    return NULL;
+  }
+  ring = &client->rings[frame->stream - 1];
+  if (ring->memory == NULL || ring->about.ring != frame->ring || frame->slot >= ring->about.slots ||
+      frame->bytes > ring->about.slot_bytes - sizeof(struct geoflow_slot)) {
+    return NULL;
+  }
+  return ring->memory + frame->slot * ring->about.slot_bytes;
+}
+
+static uint64_t generation_of(const unsigned char* slot) {
+  return __atomic_load_n((const uint64_t*)(const void*)slot, __ATOMIC_ACQUIRE);
+}
+
+int geoflow_copy_frame(struct geoflow_client* client, const struct geoflow_frame* frame,
+                       void* buffer) {
+  const unsigned char* const slot = slot_of(client, frame);
+  if (slot != NULL && generation_of(slot) == frame->generation) {
+    memcpy(buffer, slot + sizeof(struct geoflow_slot), frame->bytes);
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    if (generation_of(slot) == frame->generation) {
+      return 0;
+    }
+  }
+  return fail(client, "the frame is no longer there");
+}
+
+/* What a record is to who waits for poses and frames; GEOFLOW_TIMED_OUT: nothing. */
+static enum geoflow_received take(struct geoflow_client* client, const unsigned char* record,
+                                  size_t size, int passed, struct geoflow_event* event) {
+  struct geoflow_header header;
+  struct geoflow_ring ring;
+  struct geoflow_end end;
+  if (geoflow_parse(record, size, &header, &event->pose, sizeof event->pose) != 0) {
+    (void)fail(client, "the daemon sent what is no record");
+    return GEOFLOW_FAILED;
+  }
+  switch (header.type) {
+    case GEOFLOW_POSE:
+      break;
+    case GEOFLOW_FRAME:
+      (void)geoflow_parse(record, size, &header, &event->frame, sizeof event->frame);
+      if (slot_of(client, &event->frame) == NULL) {
+        return GEOFLOW_TIMED_OUT; /* of a stream of a later version */
+      }
+      break;
+    case GEOFLOW_RING:
+      (void)geoflow_parse(record, size, &header, &ring, sizeof ring);
+      return map_ring(client, &ring, passed) == 0 ? GEOFLOW_TIMED_OUT : GEOFLOW_FAILED;
+    case GEOFLOW_END:
+      (void)geoflow_parse(record, size, &header, &end, sizeof end);
+      client->end_reason = end.reason;
+      return GEOFLOW_ENDED;
+    default:
+      return GEOFLOW_TIMED_OUT; /* a record of a later version */
+  }
+  client->dropped = header.dropped;
+  event->type = (enum geoflow_record_type)header.type;
+  return GEOFLOW_RECEIVED;
+}
+
+enum geoflow_received geoflow_next(struct geoflow_client* client, struct geoflow_event* event,
+                                   int timeout_ms) {
+  enum geoflow_received received = GEOFLOW_TIMED_OUT;
+  while (received == GEOFLOW_TIMED_OUT) {
     unsigned char record[GEOFLOW_MAX_RECORD];
-    struct geoflow_header header;
-    struct geoflow_end end;
-    const ssize_t size = receive(client->fd, record, timeout_ms);
+    int passed = -1;
+    const ssize_t size = receive(client->fd, record, timeout_ms, &passed);
     if (size == -2) {
       return GEOFLOW_TIMED_OUT;
     }
@@ -158,27 +295,31 @@ enum geoflow_received geoflow_next_pose(struct geoflow_client* client, struct ge
       client->end_reason = 0;
       return GEOFLOW_ENDED;
     }
-    if (geoflow_parse(record, (size_t)size, &header, pose, sizeof *pose) != 0) {
-      (void)fail(client, "the daemon sent what is no record");
-      return GEOFLOW_FAILED;
-    }
-    if (header.type == GEOFLOW_POSE) {
-      client->dropped = header.dropped;
-      return GEOFLOW_RECEIVED;
-    }
-    if (header.type == GEOFLOW_END) {
-      (void)geoflow_parse(record, (size_t)size, &header, &end, sizeof end);
-      client->end_reason = end.reason;
-      return GEOFLOW_ENDED;
-    }
-    /* A record of a later version: skipped. */
+    received = take(client, record, (size_t)size, passed, event);
+    close_if_open(passed);
   }
+  return received;
+}
+
+enum geoflow_received geoflow_next_pose(struct geoflow_client* client, struct geoflow_pose* pose,
+                                        int timeout_ms) {
+  struct geoflow_event event;
+  enum geoflow_received received = GEOFLOW_RECEIVED;
+  do {
+    received = geoflow_next(client, &event, timeout_ms);
+  } while (received == GEOFLOW_RECEIVED && event.type != GEOFLOW_POSE);
+  if (received == GEOFLOW_RECEIVED) {
+    *pose = event.pose;
+  }
+  return received;
 }
 
 void geoflow_close(struct geoflow_client* client) {
-  if (client->fd >= 0) {
-    close(client->fd);
-    client->fd = -1;
+  int i = 0;
+  close_if_open(client->fd);
+  client->fd = -1;
+  for (i = 0; i < GEOFLOW_STREAMS; ++i) {
+    unmap(&client->rings[i]);
   }
 }
 

@@ -8,6 +8,8 @@
  *   }
  *   geoflow_close(&client);
  *
+ * Images come in memory that is shared with the daemon: geoflow_next(), geoflow_copy_frame().
+ *
  * Copy geoflow_client.h and geoflow_client.c into your program, and
  * geoflow/daemon/geoflow_protocol.h, which describes the records, to where it looks for headers. A
  * client belongs to one thread at a time; any number of clients may be connected. For machines with
@@ -23,13 +25,30 @@ extern "C" {
 
 #define GEOFLOW_POSE_SOCKET "/run/geoflow/pose.sock"
 
+enum { GEOFLOW_STREAMS = 2 }; /* colour, depth */
+
+/* Memory with frames of one stream. */
+struct geoflow_mapped_ring {
+  struct geoflow_ring about;   /* where its frames are, and of which camera */
+  const unsigned char* memory; /* NULL: there is none yet */
+};
+
 struct geoflow_client {
   int fd;                         /* -1: not connected; may be watched by poll() for reading */
   struct geoflow_welcome welcome; /* what the daemon said of itself */
-  uint32_t dropped;               /* poses missed before the newest one, for being slow */
+  uint32_t
+      dropped; /* poses, or frames of that stream, missed before the newest one for being slow */
   uint32_t
       end_reason;  /* after GEOFLOW_ENDED: enum geoflow_end_reason; 0: it has gone without a word */
   char error[256]; /* after a failure: a sentence */
+  struct geoflow_mapped_ring rings[GEOFLOW_STREAMS]; /* of colour, of depth */
+};
+
+/* What has come. */
+struct geoflow_event {
+  enum geoflow_record_type type; /* GEOFLOW_POSE or GEOFLOW_FRAME */
+  struct geoflow_pose pose;
+  struct geoflow_frame frame;
 };
 
 /* What is left zero has its default. */
@@ -37,12 +56,12 @@ struct geoflow_options {
   const char* socket; /* path; NULL: GEOFLOW_POSE_SOCKET */
   const char* name;   /* for the daemon's log; NULL: none */
   uint32_t want;      /* enum geoflow_want; 0: GEOFLOW_WANT_POSE */
-  double max_rate_hz; /* poses a second at most; 0: every one */
+  double max_rate_hz; /* poses, and frames of each stream, a second at most; 0: every one */
 };
 
 enum geoflow_received {
   GEOFLOW_FAILED = -1,   /* client->error says why; close it */
-  GEOFLOW_RECEIVED = 0,  /* a pose */
+  GEOFLOW_RECEIVED = 0,  /* a pose, or a frame */
   GEOFLOW_TIMED_OUT = 1, /* none came in time, or a signal did */
   GEOFLOW_ENDED = 2      /* no more will follow: close it */
 };
@@ -54,6 +73,17 @@ int geoflow_connect(struct geoflow_client* client, const struct geoflow_options*
 /* Waits for the next pose at most `timeout_ms` (negative: for ever; 0: takes what is there). */
 enum geoflow_received geoflow_next_pose(struct geoflow_client* client, struct geoflow_pose* pose,
                                         int timeout_ms);
+
+/* Likewise for the next pose or frame, whichever is wanted and comes first. */
+enum geoflow_received geoflow_next(struct geoflow_client* client, struct geoflow_event* event,
+                                   int timeout_ms);
+
+/* Copies the bytes of the frame that came to `buffer`, which has room for frame->bytes. Returns 0;
+ * or -1, with client->error set, where they have been overwritten by now: a ring has 8 frames, so
+ * take each as soon as it comes. client->rings[frame->stream - 1].about has the camera's
+ * intrinsics and the unit of depth. */
+int geoflow_copy_frame(struct geoflow_client* client, const struct geoflow_frame* frame,
+                       void* buffer);
 
 /* Idempotent; also after geoflow_connect() has failed. */
 void geoflow_close(struct geoflow_client* client);

@@ -11,7 +11,7 @@
 
 Frames: T_a_b maps coordinates in b to a; its p is the position of b in a [m], its q a quaternion x, y, z, w. map -> odom -> base_link,
 x forward, y left, z up. T_odom_base never jumps, T_map_odom may. Times are CLOCK_MONOTONIC in nanoseconds (time.monotonic_ns) unless they
-say otherwise. The records are described in docs/protocol.md. An object belongs to one thread at a time.
+say otherwise. The records are described in docs/protocol.md. Images: geoflow_frames.py. An object belongs to one thread at a time.
 """
 import json
 import socket
@@ -19,10 +19,10 @@ import struct
 from dataclasses import dataclass
 
 MAGIC = 0x574F4C46
-MAJOR, MINOR = 1, 1
+MAJOR, MINOR = 1, 2
 LARGEST_RECORD = 4096
-HELLO, WELCOME, REFUSE, POSE, END = 1, 2, 3, 4, 5
-WANT_POSE, WANT_PROPAGATED = 1, 2
+HELLO, WELCOME, REFUSE, POSE, END, RING, FRAME = 1, 2, 3, 4, 5, 6, 7
+WANT_POSE, WANT_PROPAGATED, WANT_COLOR, WANT_DEPTH = 1, 2, 4, 8
 STATUS = ("STARTING", "INITIALISING", "TRACKING", "DEGRADED", "RELOCALISING", "LOST")
 SOURCE = ("none", "imu", "legs", "pnp", "gicp", "constant_velocity")
 SENSORS = ("color", "depth", "imu", "legs", "body_velocity")
@@ -131,7 +131,7 @@ def split(record):
     return Header(major, minor, kind, dropped, sequence), record[_HEADER.size:]
 
 
-def _unpack(layout, payload):
+def unpack(layout, payload):
     """The fields of a payload: what the sender did not have yet is zero, what it has besides is left out."""
     return layout.unpack(payload[:layout.size].ljust(layout.size, b"\0"))
 
@@ -146,7 +146,7 @@ def _name(names, number):
 
 def parse_pose(payload, dropped=0):
     """The Pose of a POSE record's payload, of any minor version."""
-    f = _unpack(_POSE, payload)
+    f = unpack(_POSE, payload)
     doubles = f[7:48]
     status, source, quality, _, flags, resets, map_id, visual, depth, sensors, lost, t_frame = f[48:]
     return Pose(*f[:7], Transform(doubles[0:3], doubles[3:7]), Transform(doubles[7:10], doubles[10:14]), doubles[14:17], doubles[17:20],
@@ -187,19 +187,16 @@ class _Connection:
         self.close()
 
 
-class PoseClient(_Connection):
-    """Poses as they come. Iterating ends when the daemon says that no more will follow; `end_reason` then is END_STOPPED, END_REPLAYED or 0
-    (it has gone without a word).
-
-    `propagated`: poses at each IMU sample instead of each frame. `max_rate_hz`: poses a second at most; 0: every one. Error where no daemon
-    answers, or it refuses.
+class RecordClient(_Connection):
+    """Records as they come, after the handshake. `end_reason`: None while more may follow, then END_STOPPED, END_REPLAYED or 0 (the daemon
+    has gone without a word). Error where no daemon answers, or it refuses.
     """
 
-    def __init__(self, path=POSE_SOCKET, name="python", propagated=False, max_rate_hz=0.0):
+    def __init__(self, path, hello):
         super().__init__(path, socket.SOCK_SEQPACKET)
         self.end_reason = None
         try:
-            self._greet(make_hello(name, WANT_PROPAGATED if propagated else WANT_POSE, max_rate_hz))
+            self._greet(hello)
         except (OSError, Error) as error:
             self.close()
             raise error if isinstance(error, Error) else Error(f"{path}: {error}") from error
@@ -214,31 +211,51 @@ class PoseClient(_Connection):
             raise Error("the daemon does not answer")
         header, payload = split(record)
         if header.type == REFUSE:
-            raise Error("the daemon refused: " + _text(_unpack(_REFUSE, payload)[2]))
+            raise Error("the daemon refused: " + _text(unpack(_REFUSE, payload)[2]))
         if header.type != WELCOME:
             raise Error("what answers is no geoflowd", "invalid_data")
-        fields = _unpack(_WELCOME, payload)
+        fields = unpack(_WELCOME, payload)
         self.client_id, self.instance, self.boot_id = fields[3:6]
         self.version = _text(fields[11])
 
+    def receive(self, timeout):
+        """Header, payload and descriptors of the next record, END apart; None after `timeout` seconds (None: no limit), and where no more
+        will follow."""
+        if self.end_reason is not None:
+            return None
+        self._socket.settimeout(timeout)
+        try:
+            record, descriptors, _, _ = socket.recv_fds(self._socket, LARGEST_RECORD, 1)
+        except (TimeoutError, BlockingIOError):
+            return None
+        except ConnectionResetError:
+            record, descriptors = b"", []
+        if not record:
+            self.end_reason = 0
+            return None
+        header, payload = split(record)
+        if header.type == END:
+            self.end_reason = unpack(_END, payload)[0]
+            return None
+        return header, payload, descriptors
+
+
+class PoseClient(RecordClient):
+    """Poses as they come. Iterating ends when the daemon says that no more will follow.
+
+    `propagated`: poses at each IMU sample instead of each frame. `max_rate_hz`: poses a second at most; 0: every one. Error where no daemon
+    answers, or it refuses.
+    """
+
+    def __init__(self, path=POSE_SOCKET, name="python", propagated=False, max_rate_hz=0.0):
+        super().__init__(path, make_hello(name, WANT_PROPAGATED if propagated else WANT_POSE, max_rate_hz))
+
     def next(self, timeout=None):
         """The next Pose; None after `timeout` seconds (None: no limit), and where no more will follow (`end_reason` is set)."""
-        self._socket.settimeout(timeout)
-        while self.end_reason is None:
-            try:
-                record = self._socket.recv(LARGEST_RECORD)
-            except (TimeoutError, BlockingIOError):
-                return None
-            except ConnectionResetError:
-                record = b""
-            if not record:
-                self.end_reason = 0
-                return None
-            header, payload = split(record)
+        while (received := self.receive(timeout)) is not None:
+            header, payload, _ = received
             if header.type == POSE:
                 return parse_pose(payload, header.dropped)
-            if header.type == END:
-                self.end_reason = _unpack(_END, payload)[0]
         return None
 
     def __iter__(self):

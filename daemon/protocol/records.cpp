@@ -134,7 +134,8 @@ tl::expected<Hello, Refusal> parse_hello(std::span<const std::byte> bytes) {
   return Hello{.name = printable({&hello.name[0], sizeof hello.name}),
                .max_rate_hz = hello.max_rate_hz,
                .wants_pose = (hello.want & GEOFLOW_WANT_POSE) != 0,
-               .wants_propagated = (hello.want & GEOFLOW_WANT_PROPAGATED) != 0};
+               .wants_propagated = (hello.want & GEOFLOW_WANT_PROPAGATED) != 0,
+               .wants_frames = hello.want & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH)};
 }
 
 std::vector<std::byte> encode_record(geoflow_record_type type, std::uint32_t dropped,

@@ -5,18 +5,21 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <string>
 #include <utility>
 
 #include <sys/socket.h>
 #include <sys/types.h>
+#include <sys/uio.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/hal/time.hpp"
 
 #include "server/acceptor.hpp"
+#include "stream/image_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -67,6 +70,10 @@ PoseConnection::Outcome PoseConnection::greet(std::span<const std::byte> datagra
   wants_pose_ = hello->wants_pose;
   wants_propagated_ = hello->wants_propagated;
   rate_ = RateLimit{hello->max_rate_hz};
+  wants_frames_ = hello->wants_frames;
+  for (const std::uint32_t stream : {GEOFLOW_COLOR, GEOFLOW_DEPTH}) {
+    frames_[stream].rate = rate_;
+  }
   geoflow_welcome reply = welcome;
   reply.client_id = id_;
   welcomed_ = send(encode_record(GEOFLOW_WELCOME, 0, sent_, reply)) == Sent::kYes;
@@ -106,6 +113,41 @@ PoseConnection::Outcome PoseConnection::offer(const geoflow_pose& pose, HostTime
   return result == Sent::kBroken ? Outcome::kLost : Outcome::kOpen;
 }
 
+PoseConnection::Outcome PoseConnection::offer(const StreamedFrame& streamed, HostTime now) {
+  if (!welcomed_ || ending_ || (wants_frames_ & want_of(streamed.frame.stream)) == 0) {
+    return Outcome::kOpen;
+  }
+  FrameStream& stream = frames_[streamed.frame.stream];
+  if (!stream.rate.due(now)) {
+    return Outcome::kOpen;
+  }
+  const Sent result = send_frame(streamed, stream);
+  if (result == Sent::kFull) {
+    ++dropped_;
+    ++stream.dropped_since_last;
+    waiting_since_ = blocked() ? waiting_since_ : now;
+    starved_ = true;
+  }
+  return result == Sent::kBroken ? Outcome::kLost : Outcome::kOpen;
+}
+
+PoseConnection::Sent PoseConnection::send_frame(const StreamedFrame& streamed,
+                                                FrameStream& stream) {
+  if (stream.ring != streamed.ring.ring) {
+    const Sent result = send(encode_record(GEOFLOW_RING, 0, sent_, streamed.ring), streamed.fd);
+    if (result != Sent::kYes) {
+      return result;
+    }
+    stream.ring = streamed.ring.ring;
+  }
+  const Sent result =
+      send(encode_record(GEOFLOW_FRAME, stream.dropped_since_last, sent_, streamed.frame));
+  if (result == Sent::kYes) {
+    stream.dropped_since_last = 0;
+  }
+  return result;
+}
+
 bool PoseConnection::wants(const geoflow_pose& pose) const noexcept {
   if (is_propagated(pose)) {
     return wants_propagated_;
@@ -122,6 +164,7 @@ PoseConnection::Outcome PoseConnection::flush(HostTime now) {
     pending_.reset();
     waiting_since_ = now;
   }
+  starved_ = false;  // there is room for the next one
   return ending_ ? send_end(*ending_) : Outcome::kOpen;
 }
 
@@ -151,8 +194,23 @@ PoseConnection::Sent PoseConnection::send_pose(const geoflow_pose& pose) {
   return result;
 }
 
-PoseConnection::Sent PoseConnection::send(std::span<const std::byte> record) {
-  const ssize_t size = ::send(fd(), record.data(), record.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+PoseConnection::Sent PoseConnection::send(std::span<const std::byte> record, int passed) {
+  iovec part{.iov_base = const_cast<std::byte*>(record.data()),  // NOLINT: sendmsg() only reads it
+             .iov_len = record.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof passed)> control{};
+  if (passed >= 0) {
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    cmsghdr* const header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(sizeof passed);
+    std::memcpy(CMSG_DATA(header), &passed, sizeof passed);
+  }
+  const ssize_t size = ::sendmsg(fd(), &message, MSG_DONTWAIT | MSG_NOSIGNAL);
   if (size >= 0) {
     ++sent_;
     return Sent::kYes;

@@ -33,6 +33,7 @@
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
 #include "server/pose_connection.hpp"
+#include "stream/image_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -161,11 +162,28 @@ void PoseServer::publish(const geoflow_pose& pose) {
   if (!is_propagated(pose)) {
     newest_ = pose;
   }
+  offer_to_all(pose);
+}
+
+void PoseServer::publish(const StreamedFrame& frame) {
+  offer_to_all(frame);
+}
+
+std::uint32_t PoseServer::wanted_frames() const noexcept {
+  std::uint32_t wanted = 0;
+  for (const auto& [fd, client] : clients_) {
+    wanted |= client->wanted_frames();
+  }
+  return wanted;
+}
+
+template <typename Item>
+void PoseServer::offer_to_all(const Item& item) {
   const HostTime now = HostClock::now();
   std::vector<int> lost;
   for (const auto& [fd, client] : clients_) {
     const bool was_blocked = client->blocked();
-    if (client->offer(pose, now) != Outcome::kOpen) {
+    if (client->offer(item, now) != Outcome::kOpen) {
       lost.push_back(fd);
     } else if (client->blocked() != was_blocked) {
       settle(*client, Outcome::kOpen);

@@ -17,6 +17,7 @@
 #include "server/acceptor.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_connection.hpp"
+#include "stream/image_streams.hpp"
 
 namespace geoflow::daemon {
 
@@ -38,6 +39,10 @@ class PoseServer {
   /// Sends a pose to those who want its kind; a client that comes later is greeted with the newest
   /// of a frame.
   void publish(const geoflow_pose& pose);
+  /// Tells those who want the frame's stream that it is there.
+  void publish(const StreamedFrame& frame);
+  /// Of which streams anybody wants frames (geoflow_want, or-ed).
+  [[nodiscard]] std::uint32_t wanted_frames() const noexcept;
   /// Tells every client that nothing more follows, after what waits for it, and closes it.
   void finish(geoflow_end_reason reason);
   /// From now on these limits hold (clients, clients_per_user, handshake_timeout, stall_timeout).
@@ -54,6 +59,8 @@ class PoseServer {
   void on_connection(Connection connection);
   void on_ready(int fd, std::uint32_t events);
   void settle(PoseConnection& client, PoseConnection::Outcome outcome);
+  template <typename Item>
+  void offer_to_all(const Item& item);
   void close(int fd, std::string_view why);
 
   EventLoop& loop_;

@@ -28,21 +28,19 @@
 #include "geoflow/hal/time.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
-#include "bus/ros_bus.hpp"
 #include "config/reload.hpp"
 #include "map/map_commands.hpp"
 #include "map/map_job.hpp"
 #include "protocol/control_request.hpp"
 #include "server/control_connection.hpp"
-#include "server/control_server.hpp"
 #include "server/event_loop.hpp"
-#include "server/pose_server.hpp"
 #include "service/given_sockets.hpp"
 #include "service/memory_lock.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
 #include "service/source_watch.hpp"
 #include "service/status_line.hpp"
+#include "src/outlets.hpp"
 #include "src/signal_watch.hpp"
 #include "src/worker.hpp"
 
@@ -70,8 +68,7 @@ class Daemon {
 
   Result<void> start(service::GivenSockets given) {
     return watch_signals()
-        .and_then([&] { return open_sockets(std::move(given)); })
-        .and_then([this] { return start_bus(); })
+        .and_then([&] { return open_outlets(std::move(given)); })
         .and_then([this] { return start_worker(); })
         .and_then([this] {
           return loop_->add(bell_.fd(), EPOLLIN, [this](std::uint32_t /*events*/) { on_bell(); });
@@ -97,36 +94,14 @@ class Daemon {
     return std::move(watch).map([this](auto made) { signals_ = std::move(made); });
   }
 
-  Result<void> open_sockets(service::GivenSockets given) {
-    if (given.pose || !config_.socket.pose.empty()) {
-      auto server = PoseServer::create(*loop_, config_.socket, Worker::clock_flags(config_.source),
-                                       std::move(given.pose));
-      if (!server) {
-        return tl::unexpected{std::move(server.error())};
-      }
-      poses_ = std::move(*server);
-    }
-    if (given.control || !config_.socket.control.empty()) {
-      auto server =
-          ControlServer::create(*loop_, config_.socket,
-                                {.status = [this] { return status(); },
-                                 .config = [this] { return configuration(); },
-                                 .change = [this](const ChangeRequest& request,
-                                                  const Asker& asker) { begin(request, asker); }},
-                                std::move(given.control));
-      if (!server) {
-        return tl::unexpected{std::move(server.error())};
-      }
-      control_ = std::move(*server);
-    }
-    return {};
-  }
-
-  Result<void> start_bus() {
-    if (!config_.ros.publish) {
-      return {};
-    }
-    return bus::RosBus::start(config_.ros).map([this](auto started) { bus_ = std::move(started); });
+  Result<void> open_outlets(service::GivenSockets given) {
+    auto outlets =
+        Outlets::open(*loop_, config_, Worker::clock_flags(config_.source), std::move(given),
+                      {.status = [this] { return status(); },
+                       .config = [this] { return configuration(); },
+                       .change = [this](const ChangeRequest& request,
+                                        const Asker& asker) { begin(request, asker); }});
+    return std::move(outlets).map([this](auto opened) { outlets_ = std::move(opened); });
   }
 
   Result<void> start_worker() {
@@ -143,11 +118,16 @@ class Daemon {
     const bool ended = worker_->ended();  // before the pose is taken, which then is the last
     if (const auto pose = worker_->take_pose()) {
       resets_ = pose->reset_counter;
-      publish(*pose);
+      newest_ = *pose;
+      outlets_->publish(*pose);
     }
     if (const auto pose = worker_->take_propagated()) {
-      publish_propagated(*pose);
+      outlets_->publish_propagated(*pose);
     }
+    if (const auto images = worker_->take_images()) {
+      outlets_->publish(*images, worker_->calibration());
+    }
+    worker_->want_images(outlets_->wants_images());
     if (ended && !leaving_) {
       running_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
     }
@@ -160,28 +140,6 @@ class Daemon {
       end_with(std::move(proceeded.error()));
     } else if (worker_->is_open()) {
       reporter_.ready();
-    }
-  }
-
-  void publish(const geoflow_pose& pose) {
-    newest_ = pose;
-    if (poses_) {
-      poses_->publish(pose);
-    }
-    if (control_) {
-      control_->publish(pose);
-    }
-    if (bus_) {
-      bus_->publish(pose);
-    }
-  }
-
-  void publish_propagated(const geoflow_pose& pose) {
-    if (poses_) {
-      poses_->publish(pose);
-    }
-    if (bus_) {
-      bus_->publish(pose);
     }
   }
 
@@ -201,7 +159,7 @@ class Daemon {
     const HostTime now = HostClock::now();
     switch (request.change) {
       case Change::kReload:
-        control_->conclude(asker, reload());
+        outlets_->conclude(asker, reload());
         return;
       case Change::kSaveMap:
         map_.ask({.job = MapJob::kSave}, asker, now);
@@ -230,12 +188,7 @@ class Daemon {
       log::error("daemon", "not reloaded: {}", reloaded.error().message);
       return tl::unexpected{std::move(reloaded.error())};
     }
-    if (poses_) {
-      poses_->set_limits(running_.socket);
-    }
-    if (control_) {
-      control_->set_limits(running_.socket);
-    }
+    outlets_->set_limits(running_.socket);
     log::info("daemon", "reloaded; changed: {}; at the next start only: {}",
               fmt::join(reloaded->changed, ", "), fmt::join(reloaded->restart, ", "));
     return nlohmann::json{{"changed", reloaded->changed}, {"restart", reloaded->restart}};
@@ -260,21 +213,13 @@ class Daemon {
   void leave(geoflow_end_reason reason) {
     leaving_ = HostClock::now();
     map_.abandon("the daemon ends");
-    if (poses_) {
-      poses_->finish(reason);
-    }
+    outlets_->finish(reason);
     keep_house();
   }
 
   void keep_house() {
-    if (poses_) {
-      poses_->check_timeouts();
-    }
-    if (control_) {
-      control_->check_timeouts();
-    }
-    const bool heard = !poses_ || poses_->client_count() == 0;
-    if (leaving_ && (heard || HostClock::now() - *leaving_ > kLastWords)) {
+    outlets_->check_timeouts();
+    if (leaving_ && (outlets_->is_done() || HostClock::now() - *leaving_ > kLastWords)) {
       loop_->stop();
     }
     report();
@@ -297,13 +242,11 @@ class Daemon {
       if (seen.trouble.empty() && !map_.trouble().empty()) {
         seen.trouble = "the map is not saved: " + map_.trouble();
       }
-      if (seen.trouble.empty() && bus_ && !bus_->trouble().empty()) {
-        seen.trouble = "ROS 2 is not told: " + bus_->trouble();
+      if (seen.trouble.empty() && !outlets_->trouble().empty()) {
+        seen.trouble = "ROS 2 is not told: " + outlets_->trouble();
       }
       reporter_.tell(seen, now);
-      if (bus_) {
-        bus_->report(seen, reporter_.told());
-      }
+      outlets_->report(seen, reporter_.told());
     }
   }
 
@@ -317,13 +260,7 @@ class Daemon {
     status["pid"] = ::getpid();
     status["uptime_s"] = to_seconds(HostClock::now() - began_);
     status["peak_memory_mib"] = peak_memory_mib();
-    status["pose_socket"] = poses_ ? poses_->status() : nlohmann::json{};
-    status["control_clients"] = control_->client_count();
-    if (bus_) {
-      status["ros"] = {{"trouble", bus_->trouble()},
-                       {"published", bus_->published()},
-                       {"readers", bus_->readers()}};
-    }
+    outlets_->add_status(status);
     status["summary"] = reporter_.told();
     status["pose"] = newest_ ? pose_to_json(*newest_) : nlohmann::json{};
     status["map"] = map_.status(HostClock::now());
@@ -351,13 +288,11 @@ class Daemon {
   std::unique_ptr<EventLoop> loop_;
   timesync::Doorbell bell_;  // from the worker's threads
   std::unique_ptr<SignalWatch> signals_;
-  std::unique_ptr<PoseServer> poses_;
-  std::unique_ptr<ControlServer> control_;
+  std::unique_ptr<Outlets> outlets_;
   MapCommands map_{[this](const Asker& asker, const Result<nlohmann::json>& outcome) {
-    control_->conclude(asker, outcome);
+    outlets_->conclude(asker, outcome);
   }};
   std::uint32_t resets_ = 0;
-  std::unique_ptr<bus::RosBus> bus_;  // null: not published
   std::unique_ptr<Worker> worker_;
   std::optional<geoflow_pose> newest_;
   service::SourceWatch sources_;

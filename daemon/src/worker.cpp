@@ -34,6 +34,7 @@
 #include "map/map_keeper.hpp"
 #include "service/source_watch.hpp"
 #include "src/opener.hpp"
+#include "stream/image_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -151,7 +152,16 @@ void Worker::wake_estimator() {
 }
 
 void Worker::publish(const SyncedPacket& packet, const PoseEstimate& estimate) {
-  newest_.store(make_pose(packet, estimate, context(estimate.t)));
+  const geoflow_pose pose = make_pose(packet, estimate, context(estimate.t));
+  newest_.store(pose);
+  if (wants_images_.load(std::memory_order_relaxed)) {
+    images_.store({.color = packet.color,
+                   .depth = packet.depth,
+                   .depth_offset = packet.depth_offset,
+                   .t_capture_ns = pose.t_capture_ns,
+                   .t_recording_ns = pose.t_recording_ns,
+                   .frame = pose.frame});
+  }
   bell_.ring();
 }
 

@@ -16,6 +16,7 @@
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/thread_activity.hpp"
+#include "geoflow/hal/calibration.hpp"
 #include "geoflow/hal/pose_estimate.hpp"
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/synced_packet.hpp"
@@ -26,6 +27,7 @@
 #include "map/map_keeper.hpp"
 #include "service/source_watch.hpp"
 #include "src/opener.hpp"
+#include "stream/image_streams.hpp"
 
 namespace geoflow::daemon {
 
@@ -56,6 +58,11 @@ class Worker {
   [[nodiscard]] std::optional<geoflow_pose> take_pose() { return newest_.take_new(); }
   /// The newest that was carried on to an IMU sample, once.
   [[nodiscard]] std::optional<geoflow_pose> take_propagated() { return propagated_.take_new(); }
+  /// The images of the newest frame, once; none while they are not wanted.
+  [[nodiscard]] std::optional<Images> take_images() { return images_.take_new(); }
+  void want_images(bool wanted) noexcept { wants_images_.store(wanted, std::memory_order_relaxed); }
+  /// The source's; to be called once that is open.
+  [[nodiscard]] const Calibration& calibration() const { return run_->calibration; }
   /// True when the source has ended; the last pose can then be taken.
   [[nodiscard]] bool ended() const noexcept { return ended_.load(std::memory_order_acquire); }
   /// Ends all its threads and, the first time, saves the configured map.
@@ -93,6 +100,8 @@ class Worker {
   std::unique_ptr<Run> run_;                   // null until the source is open
   timesync::Latest<geoflow_pose> newest_;      // from the estimating thread to the loop's
   timesync::Latest<geoflow_pose> propagated_;  // from the synchronising thread to the loop's
+  timesync::Latest<Images> images_;            // from the estimating thread to the loop's
+  std::atomic<bool> wants_images_{false};
   std::atomic<bool> ended_{false};
   std::unique_ptr<MapKeeper> keeper_;
   std::unique_ptr<Pipeline> pipeline_;

@@ -25,7 +25,7 @@ using Bytes = std::vector<std::byte>;
 
 class CClient : public testing::TestWithParam<std::string> {
  protected:
-  void SetUp() override { ASSERT_EQ(records_.size(), 5U); }
+  void SetUp() override { ASSERT_EQ(records_.size(), GetParam() == "1.2" ? 7U : 5U); }
   [[nodiscard]] const Bytes& record(const std::string& name) const { return records_.at(name); }
   [[nodiscard]] bool is_first() const { return GetParam() == "1.0"; }
 
@@ -83,11 +83,11 @@ TEST_P(CClient, TheDaemonReadsTheHello) {
   EXPECT_TRUE(hello->wants_pose);
 }
 
-INSTANTIATE_TEST_SUITE_P(Versions, CClient, testing::Values("1.0", "1.1"));
+INSTANTIATE_TEST_SUITE_P(Versions, CClient, testing::Values("1.0", "1.1", "1.2"));
 
 /// What the daemon of this version writes is what is frozen.
 TEST(Golden, TheDaemonWritesThePose) {
-  const auto records = tests::golden_records("1.1");
+  const auto records = tests::golden_records("1.2");
   const Bytes& golden = records.at("pose");
   const auto view = daemon::parse_record(golden);
   ASSERT_TRUE(view) << view.error().message;
@@ -95,18 +95,45 @@ TEST(Golden, TheDaemonWritesThePose) {
   EXPECT_THAT(daemon::encode_record(GEOFLOW_POSE, 9, 10, pose), ElementsAreArray(golden));
 }
 
+TEST(Golden, RingsAndFramesAreReadAndWrittenAsTheyAre) {
+  const auto records = tests::golden_records("1.2");
+  geoflow_header header{};
+  geoflow_ring ring{};
+  geoflow_frame frame{};
+  const auto read = [&](const Bytes& bytes, void* payload, std::size_t size) {
+    return geoflow_parse(bytes.data(), bytes.size(), &header, payload, size);
+  };
+  ASSERT_EQ(read(records.at("ring"), &ring, sizeof ring), 0);
+  EXPECT_EQ(header.type, GEOFLOW_RING);
+  EXPECT_EQ(ring.ring, 1U);
+  EXPECT_EQ(ring.slots, 5U);
+  EXPECT_EQ(ring.intrinsics[0], 8.0);
+  EXPECT_EQ(ring.distortion[4], 16.0);
+  EXPECT_EQ(ring.unit_m, 17.0);
+  ASSERT_EQ(read(records.at("frame"), &frame, sizeof frame), 0);
+  EXPECT_EQ(header.type, GEOFLOW_FRAME);
+  EXPECT_EQ(frame.t_capture_ns, 1);
+  EXPECT_EQ(frame.bytes, 6U);
+  EXPECT_EQ(frame.stream, 7U);
+  EXPECT_EQ(frame.stride, 12U);
+  EXPECT_THAT(daemon::encode_record(GEOFLOW_RING, 9, 10, ring),
+              ElementsAreArray(records.at("ring")));
+  EXPECT_THAT(daemon::encode_record(GEOFLOW_FRAME, 9, 10, frame),
+              ElementsAreArray(records.at("frame")));
+}
+
 TEST(CClientBytes, TheHelloIsTheGoldenOne) {
   const geoflow_options options{
       .socket = nullptr, .name = "abc", .want = GEOFLOW_WANT_POSE, .max_rate_hz = 2.0};
   std::array<unsigned char, 72> hello{};
   geoflow_make_hello(&options, hello.data());
-  const Bytes golden = tests::golden_records("1.1").at("hello");
+  const Bytes golden = tests::golden_records("1.2").at("hello");
   ASSERT_EQ(golden.size(), hello.size());
   EXPECT_EQ(std::memcmp(golden.data(), hello.data(), hello.size()), 0);
 }
 
 TEST(CClientBytes, WhatIsNoRecordIsRefused) {
-  Bytes bytes = tests::golden_records("1.1").at("pose");
+  Bytes bytes = tests::golden_records("1.2").at("pose");
   geoflow_header header{};
   geoflow_pose pose{};
   EXPECT_EQ(geoflow_parse(bytes.data(), 23, &header, &pose, sizeof pose), -1);

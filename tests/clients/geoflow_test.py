@@ -2,24 +2,16 @@
 import json
 import math
 import socket
-import tempfile
 import threading
 import unittest
-from pathlib import Path
 
 import geoflow
-
-GOLDEN = Path(__file__).parent / "golden"
-
-
-def golden(version):
-    lines = (GOLDEN / f"protocol-{version}.txt").read_text().splitlines()
-    return {name: bytes.fromhex(digits) for name, digits in (line.split() for line in lines if not line.startswith("#"))}
-
+import scripted_daemon
+from scripted_daemon import golden
 
 class Records(unittest.TestCase):
     def test_the_pose_is_read_in_every_version(self):
-        for version, t_frame_ns in (("1.0", 0), ("1.1", 0x0102030405060708)):
+        for version, t_frame_ns in (("1.0", 0), ("1.1", 0x0102030405060708), ("1.2", 0x0102030405060708)):
             header, payload = geoflow.split(golden(version)["pose"])
             self.assertEqual((header.type, header.dropped, header.sequence), (geoflow.POSE, 9, 10))
             pose = geoflow.parse_pose(payload, header.dropped)
@@ -34,7 +26,7 @@ class Records(unittest.TestCase):
             self.assertEqual((pose.t_frame_ns, pose.dropped), (t_frame_ns, 9))
 
     def test_the_hello_is_the_golden_one(self):
-        self.assertEqual(geoflow.make_hello("abc", geoflow.WANT_POSE, 2.0), golden("1.1")["hello"])
+        self.assertEqual(geoflow.make_hello("abc", geoflow.WANT_POSE, 2.0), golden("1.2")["hello"])
 
     def test_what_is_no_record_is_refused(self):
         record = golden("1.1")["pose"]
@@ -50,27 +42,8 @@ class Records(unittest.TestCase):
             self.assertAlmostEqual(got, expected)
 
 
-class ScriptedDaemon(unittest.TestCase):
-    """A socket whose one client gets what a test says."""
-
-    def serve(self, kind, script):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        path = Path(folder.name) / "socket"
-        listener = socket.socket(socket.AF_UNIX, kind)
-        self.addCleanup(listener.close)
-        listener.bind(str(path))
-        listener.listen(1)
-
-        def run():
-            connection, _ = listener.accept()
-            with connection:
-                script(connection)
-
-        thread = threading.Thread(target=run)
-        thread.start()
-        self.addCleanup(thread.join)
-        return path
+class ScriptedDaemon(scripted_daemon.Case):
+    """Clients of poses and requests."""
 
     def test_poses_come_until_the_end(self):
         records = golden("1.1")

@@ -127,7 +127,7 @@ TEST(ProtocolOne, GoldenBytesOfPoseSinceOneOne) {
   const auto bytes = encode_record(GEOFLOW_POSE, 9, 10, pose);
   ASSERT_EQ(bytes.size(), 448U);
   const std::string text = hexadecimal(bytes);
-  EXPECT_EQ(text.substr(0, 48), "464c4f5701010400a8010000090000000a00000000000000");
+  EXPECT_EQ(text.substr(0, 48), "464c4f5701020400a8010000090000000a00000000000000");
   EXPECT_EQ(text.substr(text.size() - 16), "0807060504030201");
 }
 
@@ -190,7 +190,7 @@ TEST(Records, HelloIsJudged) {
   newer[4] = std::byte{2};
   const auto refused = parse_hello(newer);
   EXPECT_EQ(refused.error().reason, GEOFLOW_REFUSE_VERSION);
-  EXPECT_THAT(refused.error().text, HasSubstr("1.1"));
+  EXPECT_THAT(refused.error().text, HasSubstr("1.2"));
 }
 
 TEST(Records, OdometryCovarianceIsThatOfThePoseInOdomAxes) {

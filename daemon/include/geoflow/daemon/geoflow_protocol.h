@@ -1,4 +1,4 @@
-/* Records of geoflowd's pose socket, protocol version 1.1. For C11 and C++; needs nothing but this
+/* Records of geoflowd's pose socket, protocol version 1.2. For C11 and C++; needs nothing but this
  * file.
  *
  * Connect to the socket (AF_UNIX, SOCK_SEQPACKET), send one HELLO, receive one WELCOME or REFUSE,
@@ -22,7 +22,7 @@
 
 #define GEOFLOW_MAGIC 0x574F4C46u /* the bytes "FLOW" */
 #define GEOFLOW_PROTOCOL_MAJOR 1u /* grows when a reader of the old version would be wrong */
-#define GEOFLOW_PROTOCOL_MINOR 1u /* grows when fields are appended */
+#define GEOFLOW_PROTOCOL_MINOR 2u /* grows when fields or records are added */
 #define GEOFLOW_MAX_RECORD 4096u  /* no record, header included, is larger */
 
 enum geoflow_record_type {
@@ -30,7 +30,10 @@ enum geoflow_record_type {
   GEOFLOW_WELCOME = 2, /* daemon to client: accepted */
   GEOFLOW_REFUSE = 3,  /* daemon to client: not accepted; it then closes */
   GEOFLOW_POSE = 4,    /* daemon to client: one estimate */
-  GEOFLOW_END = 5      /* daemon to client: no pose will follow; it then closes */
+  GEOFLOW_END = 5,     /* daemon to client: no pose will follow; it then closes */
+  /* since 1.2, to clients that want frames */
+  GEOFLOW_RING = 6, /* daemon to client, with a descriptor: memory that frames will be in */
+  GEOFLOW_FRAME = 7 /* daemon to client: a frame is there */
 };
 
 /* 24 bytes before every payload. */
@@ -46,9 +49,12 @@ struct geoflow_header {
 };
 
 enum geoflow_want {
-  GEOFLOW_WANT_POSE = 1,      /* one pose a frame */
-  GEOFLOW_WANT_PROPAGATED = 2 /* since 1.1: one an IMU sample, carried on from the newest frame;
-                                 a frame's own only while it is newer than those */
+  GEOFLOW_WANT_POSE = 1,       /* one pose a frame */
+  GEOFLOW_WANT_PROPAGATED = 2, /* since 1.1: one an IMU sample, carried on from the newest frame;
+                                  a frame's own only while it is newer than those */
+  /* since 1.2 */
+  GEOFLOW_WANT_COLOR = 4, /* images of the colour camera, as the estimator sees them: gray */
+  GEOFLOW_WANT_DEPTH = 8  /* depth images, registered to the colour camera */
 };
 
 struct geoflow_hello {
@@ -56,7 +62,7 @@ struct geoflow_hello {
   uint8_t client_minor;
   uint16_t reserved;
   uint32_t want;      /* enum geoflow_want, or-ed */
-  double max_rate_hz; /* poses a second at most; 0 = every one */
+  double max_rate_hz; /* poses a second at most, and frames of each stream; 0 = every one */
   char name[32];      /* for logs; UTF-8, zero-filled */
 };
 
@@ -149,6 +155,57 @@ struct geoflow_pose {
                          where it was propagated from there by IMU and legs; 0: a daemon of 1.0 */
 };
 
+enum geoflow_stream { GEOFLOW_COLOR = 1, GEOFLOW_DEPTH = 2 };
+
+enum geoflow_format {
+  GEOFLOW_GRAY8 = 1,  /* a byte a pixel */
+  GEOFLOW_DEPTH16 = 2 /* uint16_t a pixel, in units of geoflow_ring.unit_m; 0: not measured */
+};
+
+enum geoflow_distortion {
+  GEOFLOW_UNDISTORTED = 0,
+  GEOFLOW_RADTAN = 1,     /* k1 k2 p1 p2 k3: Brown-Conrady */
+  GEOFLOW_EQUIDISTANT = 2 /* k1 k2 k3 k4: Kannala-Brandt */
+};
+
+/* Comes with the descriptor of a sealed memfd (SCM_RIGHTS), before the first FRAME in it: `slots`
+ * slots of `slot_bytes`, each a geoflow_slot and the frame's bytes behind it. To be mapped for
+ * reading, shared; it takes the place of an earlier ring of the same stream. */
+struct geoflow_ring {
+  uint64_t ring;             /* its number; no two of one daemon have the same */
+  uint64_t bytes;            /* of all of it */
+  uint64_t slot_bytes;       /* from one slot to the next */
+  uint32_t stream;           /* enum geoflow_stream */
+  uint32_t slots;            /* frame n overwrites frame n - slots */
+  uint32_t distortion_model; /* enum geoflow_distortion */
+  uint32_t reserved;         /* 0 */
+  double intrinsics[4];      /* fx fy cx cy [px]; the first pixel's centre is (0, 0) */
+  double distortion[5];
+  double unit_m; /* of depth: metres per count; else 0 */
+};
+
+/* The beginning of a slot. A reader takes the frame's bytes and then looks whether `generation`
+ * still is the FRAME's: if not, they were overwritten meanwhile. */
+struct geoflow_slot {
+  uint64_t generation; /* odd: is being written */
+  uint8_t reserved[56];
+};
+
+struct geoflow_frame {
+  int64_t t_capture_ns;   /* middle of the exposure */
+  int64_t t_recording_ns; /* likewise on the recording's own time line */
+  uint64_t frame;         /* as in the POSE that was made from it */
+  uint64_t ring;          /* in which it is */
+  uint64_t generation;    /* of its slot, while it is there */
+  uint64_t bytes;         /* of the frame */
+  uint32_t stream;        /* enum geoflow_stream */
+  uint32_t slot;
+  uint32_t format; /* enum geoflow_format */
+  uint32_t width;  /* [px] */
+  uint32_t height; /* [px] */
+  uint32_t stride; /* bytes from row to row */
+};
+
 enum geoflow_end_reason {
   GEOFLOW_END_STOPPED = 1, /* the daemon was told to stop */
   GEOFLOW_END_REPLAYED = 2 /* the recording is over */
@@ -181,6 +238,12 @@ GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, clock_flags) == 388, "pose")
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, frames_dropped) == 412, "pose");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_pose, t_frame_ns) == 416, "pose");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_end) == 8, "end");
+GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_ring) == 120, "ring");
+GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_ring, intrinsics) == 40, "ring");
+GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_ring, unit_m) == 112, "ring");
+GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_slot) == 64, "slot");
+GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_frame) == 72, "frame");
+GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_frame, stream) == 48, "frame");
 
 /* NOLINTEND(modernize-*,readability-*) */
 #endif /* GEOFLOW_PROTOCOL_H */

@@ -49,9 +49,10 @@ template <typename Payload>
 /// What a client asked for.
 struct Hello {
   std::string name;        ///< printable ASCII; everything else is replaced by '?'
-  double max_rate_hz = 0;  ///< 0: every pose
+  double max_rate_hz = 0;  ///< of poses, and of frames of each stream; 0: every one
   bool wants_pose = false;
   bool wants_propagated = false;
+  std::uint32_t wants_frames = 0;  ///< GEOFLOW_WANT_COLOR, GEOFLOW_WANT_DEPTH, or-ed
 };
 
 /// Why a client is not welcome.
