@@ -25,7 +25,7 @@ extern "C" {
 
 #define GEOFLOW_POSE_SOCKET "/run/geoflow/pose.sock"
 
-enum { GEOFLOW_STREAMS = 2 }; /* colour, depth */
+enum { GEOFLOW_STREAMS = 3 }; /* colour, depth, cloud */
 
 /* Memory with frames of one stream. */
 struct geoflow_mapped_ring {
@@ -41,7 +41,7 @@ struct geoflow_client {
   uint32_t
       end_reason;  /* after GEOFLOW_ENDED: enum geoflow_end_reason; 0: it has gone without a word */
   char error[256]; /* after a failure: a sentence */
-  struct geoflow_mapped_ring rings[GEOFLOW_STREAMS]; /* of colour, of depth */
+  struct geoflow_mapped_ring rings[GEOFLOW_STREAMS]; /* of colour, depth, cloud */
 };
 
 /* What has come. */
@@ -79,9 +79,9 @@ enum geoflow_received geoflow_next(struct geoflow_client* client, struct geoflow
                                    int timeout_ms);
 
 /* Copies the bytes of the frame that came to `buffer`, which has room for frame->bytes. Returns 0;
- * or -1, with client->error set, where they have been overwritten by now: a ring has 8 frames, so
- * take each as soon as it comes. client->rings[frame->stream - 1].about has the camera's
- * intrinsics and the unit of depth. */
+ * or -1, with client->error set, where they have been overwritten by now: a ring of images has
+ * 8, so take each as soon as it comes. A cloud's are struct geoflow_point.
+ * client->rings[frame->stream - 1].about has the camera's intrinsics and the unit of depth. */
 int geoflow_copy_frame(struct geoflow_client* client, const struct geoflow_frame* frame,
                        void* buffer);
 

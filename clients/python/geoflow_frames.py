@@ -6,8 +6,9 @@
         for frame in client:
             print(frame.stream, frame.width, frame.height, frame.pixels[:8])
 
-`pixels` are bytes: numpy.frombuffer(frame.pixels, frame.dtype).reshape(frame.height, frame.width) where there is numpy. An object belongs to
-one thread at a time.
+`pixels` are bytes: numpy.frombuffer(frame.pixels, frame.dtype).reshape(frame.height, frame.width) where there is numpy. Of a cloud of the map's
+surfaces they are `width` points of seven floats: place in the map [m], unit normal, standard deviation along it [m]. An object belongs to one
+thread at a time.
 """
 import fcntl
 import mmap
@@ -17,8 +18,8 @@ from dataclasses import dataclass
 
 import geoflow
 
-STREAM = {1: "color", 2: "depth"}
-DTYPE = {1: "u1", 2: "<u2"}  # by format: gray; counts of depth, 0: not measured
+STREAM = {1: "color", 2: "depth", 3: "cloud"}
+DTYPE = {1: "u1", 2: "<u2", 3: "<f4"}  # by format: gray; counts of depth, 0: not measured; points
 DISTORTION = ("none", "radtan", "equidistant")
 
 _RING = struct.Struct("<QQQIIII4d5dd")
@@ -50,9 +51,9 @@ class Frame:
     t_capture_ns: int
     t_recording_ns: int
     frame: int  # as in the Pose that was made from it
-    stream: str  # color or depth
+    stream: str  # color, depth or cloud
     dtype: str  # of a pixel, as numpy says it
-    width: int
+    width: int  # of a cloud: points
     height: int
     pixels: bytes  # row by row
     camera: Ring  # of which camera it is
@@ -67,16 +68,16 @@ def parse_ring(payload):
 
 
 class FrameClient(geoflow.RecordClient):
-    """Images as they come: colour (in gray, as the estimator sees it), depth, or both. Iterating ends when the daemon says that no more will
+    """Images as they come: colour (in gray, as the estimator sees it), depth, and clouds of the map's surfaces. Iterating ends when the daemon says that no more will
     follow. `lost`: images that were overwritten before they could be taken, for being slow.
 
     `max_rate_hz`: images a second of each kind at most; 0: every one. Error where no daemon answers, or it refuses.
     """
 
-    def __init__(self, path=geoflow.POSE_SOCKET, name="python", color=True, depth=True, max_rate_hz=0.0):
+    def __init__(self, path=geoflow.POSE_SOCKET, name="python", color=True, depth=True, cloud=False, max_rate_hz=0.0):
         self._rings = {}  # stream: Ring and its memory
         self.lost = 0
-        want = (geoflow.WANT_COLOR if color else 0) | (geoflow.WANT_DEPTH if depth else 0)
+        want = (geoflow.WANT_COLOR if color else 0) | (geoflow.WANT_DEPTH if depth else 0) | (geoflow.WANT_CLOUD if cloud else 0)
         super().__init__(path, geoflow.make_hello(name, want, max_rate_hz))
 
     def close(self):

@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t kMostAskers = 256;  // for one job
 constexpr Duration kWaitForRun = std::chrono::seconds{2};
+constexpr Duration kShowEvery = std::chrono::seconds{5};
 
 nlohmann::json describe(const MapReport& report) {
   switch (report.job) {
@@ -37,6 +38,7 @@ nlohmann::json describe(const MapReport& report) {
               {"moved", report.moved.string()},
               {"keyframes", report.keyframes}};
     case MapJob::kRestart:
+    case MapJob::kShow:
       break;
   }
   return {{"keyframes", report.keyframes}};
@@ -75,15 +77,27 @@ void MapCommands::turn(MapKeeper* keeper, Duration interval, HostTime now) {
     begin(*keeper, std::move(request), now);
     return;
   }
-  tried_at_ = tried_at_.value_or(now);
-  if (interval > Duration::zero() && now - *tried_at_ >= interval && keeper->has_news()) {
-    begin(*keeper, {.order = {.job = MapJob::kSave}, .since = now, .askers = {}}, now);
+  if (const auto job = due(*keeper, interval, now)) {
+    begin(*keeper, {.order = {.job = *job}, .since = now, .askers = {}}, now);
   }
+}
+
+/// What the clock asks for.
+std::optional<MapJob> MapCommands::due(const MapKeeper& keeper, Duration interval, HostTime now) {
+  tried_at_ = tried_at_.value_or(now);
+  if (interval > Duration::zero() && now - *tried_at_ >= interval && keeper.has_news()) {
+    return MapJob::kSave;
+  }
+  const bool may_show = !tried_to_show_at_ || now - *tried_to_show_at_ >= kShowEvery;
+  const bool is_new = !shown_ || keeper.mark().mapping_runs != shown_->mapping_runs;
+  return wanted_ && may_show && is_new ? std::optional{MapJob::kShow} : std::nullopt;
 }
 
 void MapCommands::begin(MapKeeper& keeper, Request request, HostTime now) {
   if (request.order.job == MapJob::kSave) {
     tried_at_ = now;
+  } else if (request.order.job == MapJob::kShow) {
+    tried_to_show_at_ = now;
   }
   under_way_ = std::move(request);
   if (const auto begun = keeper.begin(under_way_->order); !begun) {
@@ -92,17 +106,20 @@ void MapCommands::begin(MapKeeper& keeper, Request request, HostTime now) {
 }
 
 void MapCommands::conclude(const MapOutcome& outcome, HostTime now) {
-  if (outcome.report && outcome.job == MapJob::kSave) {
+  if (!outcome.report) {
+    note(outcome.job, outcome.report.error());
+  } else if (outcome.job == MapJob::kSave) {
     saved_ = *outcome.report;
     saved_at_ = now;
     trouble_.clear();
     log::debug("map", "saved: {}, {} keyframes, {} bytes", saved_.file.string(), saved_.keyframes,
                saved_.bytes);
-  } else if (outcome.report) {
+  } else if (outcome.job == MapJob::kShow) {
+    shown_ = outcome.report->mark;
+    show_(*outcome.report->cloud);
+  } else {
     log::info("map", "the estimator has begun anew, in a map of {} keyframes",
               outcome.report->keyframes);
-  } else {
-    note(outcome.job, outcome.report.error());
   }
   answer(outcome.report);
 }
@@ -117,7 +134,9 @@ void MapCommands::answer(const Result<MapReport>& report) {
 
 /// Once, until it changes: a disk that is full stays so for long.
 void MapCommands::note(MapJob job, const Error& error) {
-  if (job != MapJob::kSave) {
+  if (job == MapJob::kShow) {
+    log::error("map", "it cannot be shown: {}", error.message);
+  } else if (job != MapJob::kSave) {
     log::error("map", "the estimator could not begin anew: {}", error.message);
   } else if (error.message != trouble_) {
     trouble_ = error.message;

@@ -11,6 +11,7 @@
 #include "geoflow/hal/result.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "map/map_cloud.hpp"
 #include "map/map_job.hpp"
 #include "map/map_keeper.hpp"
 #include "server/control_connection.hpp"
@@ -23,7 +24,9 @@ namespace geoflow::daemon {
 class MapCommands {
  public:
   using Answer = std::function<void(const Asker&, const Result<nlohmann::json>&)>;
-  explicit MapCommands(Answer answer) : answer_{std::move(answer)} {}
+  using Show = std::function<void(const MapCloud&)>;
+  /// `show` gets the map's surfaces while they are wanted.
+  MapCommands(Answer answer, Show show) : answer_{std::move(answer)}, show_{std::move(show)} {}
 
   /// Has a job done for a client; it is answered when that is done, or cannot be.
   void ask(const MapOrder& order, const Asker& asker, HostTime now);
@@ -32,6 +35,9 @@ class MapCommands {
   /// `interval`: how often the map is saved; zero: not by the clock. To be called when the keeper
   /// rings, and a few times a second.
   void turn(MapKeeper* keeper, Duration interval, HostTime now);
+  /// Whether anybody wants to see the map: then it is shown soon, and again when it has changed,
+  /// every few seconds at most.
+  void want_to_see(bool wanted) noexcept { wanted_ = wanted; }
   /// The run has ended: what was asked of it is for the next one.
   void hold();
   /// What was asked will not be done.
@@ -51,10 +57,15 @@ class MapCommands {
   };
   void conclude(const MapOutcome& outcome, HostTime now);
   void begin(MapKeeper& keeper, Request request, HostTime now);
+  [[nodiscard]] std::optional<MapJob> due(const MapKeeper& keeper, Duration interval, HostTime now);
   void answer(const Result<MapReport>& report);
   void note(MapJob job, const Error& error);
 
   Answer answer_;
+  Show show_;
+  bool wanted_ = false;
+  std::optional<HostTime> tried_to_show_at_;
+  std::optional<MapMark> shown_;
   std::deque<Request> queue_;
   std::optional<Request> under_way_;
   std::optional<HostTime> tried_at_;  // the last time that it was to be saved

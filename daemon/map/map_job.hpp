@@ -3,8 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 
 #include "geoflow/hal/result.hpp"
+
+#include "map/map_cloud.hpp"
 
 namespace geoflow::daemon {
 
@@ -14,6 +17,7 @@ enum class MapJob : std::uint8_t {
   kRestart,  ///< the estimator begins anew and looks for its place in the map as it is
   kForget,   ///< the file is moved aside, and the estimator begins with an empty map
   kLoad,     ///< another file's map takes the place of this one, which is kept aside
+  kShow,     ///< its surfaces, for clients
 };
 
 /// A job to be done.
@@ -39,7 +43,8 @@ struct MapReport {
   std::filesystem::path moved{};  ///< where the map of before is kept; empty: there was none
   std::size_t keyframes = 0;      ///< in the map
   std::uintmax_t bytes = 0;       ///< of the written file
-  MapMark mark{};                 ///< of what was saved
+  MapMark mark{};                 ///< of what was saved or shown
+  std::shared_ptr<const MapCloud> cloud{};  ///< of kShow
 };
 
 /// The report, or why not.

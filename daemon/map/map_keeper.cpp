@@ -22,6 +22,7 @@
 #include "geoflow/slam/saved_map.hpp"
 #include "geoflow/timesync/doorbell.hpp"
 
+#include "map/map_cloud.hpp"
 #include "map/map_files.hpp"
 #include "map/map_job.hpp"
 
@@ -104,6 +105,7 @@ Result<void> MapKeeper::may_begin(MapJob job) const {
       return has_file();
     case MapJob::kRestart:
     case MapJob::kForget:
+    case MapJob::kShow:
       break;
   }
   return {};
@@ -134,11 +136,20 @@ std::optional<MapOutcome> MapKeeper::take_outcome() {
     return std::nullopt;
   }
   busy_ = false;
-  if (outcome->report && outcome->job == MapJob::kSave) {
-    saved_ = outcome->report->mark;
-  } else if (outcome->report && outcome->job != MapJob::kRestart) {
-    saved_.reset();
-    file_is_ours_ = true;
+  if (outcome->report) {
+    switch (outcome->job) {
+      case MapJob::kSave:
+        saved_ = outcome->report->mark;
+        break;
+      case MapJob::kForget:
+      case MapJob::kLoad:
+        saved_.reset();
+        file_is_ours_ = true;
+        break;
+      case MapJob::kRestart:
+      case MapJob::kShow:
+        break;
+    }
   }
   return outcome;
 }
@@ -204,6 +215,10 @@ void MapKeeper::take(const Task& task) {
     finish(MapJob::kSave, save(task));
     return;
   }
+  if (order_.job == MapJob::kShow) {
+    finish(MapJob::kShow, show(task));
+    return;
+  }
   auto begun = begin_anew(task);
   if (begun) {
     waiting_ = std::move(*begun);
@@ -215,6 +230,14 @@ void MapKeeper::take(const Task& task) {
 
 Result<MapReport> MapKeeper::save(const Task& task) const {
   return write(*task.map, config_.map.file, task.mark);
+}
+
+Result<MapReport> MapKeeper::show(const Task& task) {
+  return make_cloud(*task.map).map([&](MapCloud cloud) {
+    return MapReport{.job = MapJob::kShow,
+                     .mark = task.mark,
+                     .cloud = std::make_shared<const MapCloud>(std::move(cloud))};
+  });
 }
 
 Result<MapReport> MapKeeper::begin_anew(const Task& task) {
@@ -245,6 +268,7 @@ Result<std::shared_ptr<const slam::StoredMap>> MapKeeper::map_for(const Task& ta
       return load_own_map(order_.file, run_.calibration);
     case MapJob::kSave:
     case MapJob::kRestart:
+    case MapJob::kShow:
       break;
   }
   return task.map;
@@ -260,6 +284,7 @@ Result<std::filesystem::path> MapKeeper::put_aside(const Task& task,
       return replace_map(config_.map.file, *next, file_is_ours_ ? task.map.get() : nullptr);
     case MapJob::kSave:
     case MapJob::kRestart:
+    case MapJob::kShow:
       break;
   }
   return std::filesystem::path{};

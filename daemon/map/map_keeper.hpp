@@ -57,6 +57,9 @@ class MapKeeper {
   /// The map is another one than what was saved last (none yet: than none), and can be saved.
   [[nodiscard]] bool has_news() const noexcept;
 
+  /// How far the estimator is.
+  [[nodiscard]] MapMark mark() const noexcept;
+
   /// The estimator's thread, between two frames. True when it has replaced run.core: nothing that
   /// belongs to the former one may be applied to it.
   [[nodiscard]] bool between_frames();
@@ -75,12 +78,12 @@ class MapKeeper {
   void work(const std::stop_token& stop);
   void take(const Task& task);
   [[nodiscard]] Result<MapReport> save(const Task& task) const;
+  [[nodiscard]] static Result<MapReport> show(const Task& task);
   [[nodiscard]] Result<MapReport> begin_anew(const Task& task);
   [[nodiscard]] Result<std::shared_ptr<const slam::StoredMap>> map_for(const Task& task) const;
   [[nodiscard]] Result<std::filesystem::path> put_aside(const Task& task,
                                                         const slam::StoredMap* next) const;
   void finish(MapJob job, Result<MapReport> report);
-  [[nodiscard]] MapMark mark() const noexcept;
   [[nodiscard]] Result<void> has_file() const;
   [[nodiscard]] Result<void> may_save() const;
   [[nodiscard]] Result<void> may_begin(MapJob job) const;

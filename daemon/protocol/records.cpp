@@ -131,11 +131,12 @@ tl::expected<Hello, Refusal> parse_hello(std::span<const std::byte> bytes) {
   if (!std::isfinite(hello.max_rate_hz) || hello.max_rate_hz < 0.0) {
     return refuse(GEOFLOW_REFUSE_MALFORMED, "max_rate_hz must be 0 or more");
   }
-  return Hello{.name = printable({&hello.name[0], sizeof hello.name}),
-               .max_rate_hz = hello.max_rate_hz,
-               .wants_pose = (hello.want & GEOFLOW_WANT_POSE) != 0,
-               .wants_propagated = (hello.want & GEOFLOW_WANT_PROPAGATED) != 0,
-               .wants_frames = hello.want & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH)};
+  return Hello{
+      .name = printable({&hello.name[0], sizeof hello.name}),
+      .max_rate_hz = hello.max_rate_hz,
+      .wants_pose = (hello.want & GEOFLOW_WANT_POSE) != 0,
+      .wants_propagated = (hello.want & GEOFLOW_WANT_PROPAGATED) != 0,
+      .wants_frames = hello.want & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH | GEOFLOW_WANT_CLOUD)};
 }
 
 std::vector<std::byte> encode_record(geoflow_record_type type, std::uint32_t dropped,

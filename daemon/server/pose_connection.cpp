@@ -19,7 +19,7 @@
 #include "geoflow/hal/time.hpp"
 
 #include "server/acceptor.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -71,7 +71,7 @@ PoseConnection::Outcome PoseConnection::greet(std::span<const std::byte> datagra
   wants_propagated_ = hello->wants_propagated;
   rate_ = RateLimit{hello->max_rate_hz};
   wants_frames_ = hello->wants_frames;
-  for (const std::uint32_t stream : {GEOFLOW_COLOR, GEOFLOW_DEPTH}) {
+  for (const std::uint32_t stream : {GEOFLOW_COLOR, GEOFLOW_DEPTH, GEOFLOW_CLOUD}) {
     frames_[stream].rate = rate_;
   }
   geoflow_welcome reply = welcome;

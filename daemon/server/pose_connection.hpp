@@ -13,7 +13,7 @@
 
 #include "server/acceptor.hpp"
 #include "server/token_bucket.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 

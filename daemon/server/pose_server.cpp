@@ -33,7 +33,7 @@
 #include "server/event_loop.hpp"
 #include "server/listening_socket.hpp"
 #include "server/pose_connection.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -132,6 +132,9 @@ void PoseServer::on_ready(int fd, std::uint32_t events) {
     log::debug("server", "client {} '{}' (process {}, user {}) connected", client.id(),
                client.name(), client.peer().pid, client.peer().uid);
     outcome = newest_ ? client.offer(*newest_, now) : outcome;
+    if (outcome == Outcome::kOpen && newest_cloud_) {
+      outcome = client.offer(*newest_cloud_, now);
+    }
   }
   if (outcome == Outcome::kOpen && (events & EPOLLOUT) != 0) {
     outcome = client.flush(now);
@@ -166,6 +169,9 @@ void PoseServer::publish(const geoflow_pose& pose) {
 }
 
 void PoseServer::publish(const StreamedFrame& frame) {
+  if (frame.frame.stream == GEOFLOW_CLOUD) {
+    newest_cloud_ = frame;
+  }
   offer_to_all(frame);
 }
 

@@ -17,7 +17,7 @@
 #include "server/acceptor.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_connection.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 
@@ -39,7 +39,8 @@ class PoseServer {
   /// Sends a pose to those who want its kind; a client that comes later is greeted with the newest
   /// of a frame.
   void publish(const geoflow_pose& pose);
-  /// Tells those who want the frame's stream that it is there.
+  /// Tells those who want the frame's stream that it is there; of a cloud, which seldom comes, also
+  /// clients that come later.
   void publish(const StreamedFrame& frame);
   /// Of which streams anybody wants frames (geoflow_want, or-ed).
   [[nodiscard]] std::uint32_t wanted_frames() const noexcept;
@@ -69,6 +70,7 @@ class PoseServer {
   std::unique_ptr<Acceptor> acceptor_;
   std::unordered_map<int, std::unique_ptr<PoseConnection>> clients_;
   std::optional<geoflow_pose> newest_;
+  std::optional<StreamedFrame> newest_cloud_;
   std::uint32_t next_id_ = 1;
   std::uint64_t refused_ = 0;
   std::uint64_t cut_off_ = 0;

@@ -29,6 +29,7 @@
 #include "geoflow/timesync/doorbell.hpp"
 
 #include "config/reload.hpp"
+#include "map/map_cloud.hpp"
 #include "map/map_commands.hpp"
 #include "map/map_job.hpp"
 #include "protocol/control_request.hpp"
@@ -127,7 +128,9 @@ class Daemon {
     if (const auto images = worker_->take_images()) {
       outlets_->publish(*images, worker_->calibration());
     }
-    worker_->want_images(outlets_->wants_images());
+    const std::uint32_t wanted = outlets_->wanted_frames();
+    worker_->want_images((wanted & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH)) != 0);
+    map_.want_to_see((wanted & GEOFLOW_WANT_CLOUD) != 0);
     if (ended && !leaving_) {
       running_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
     }
@@ -290,8 +293,9 @@ class Daemon {
   std::unique_ptr<SignalWatch> signals_;
   std::unique_ptr<Outlets> outlets_;
   MapCommands map_{[this](const Asker& asker, const Result<nlohmann::json>& outcome) {
-    outlets_->conclude(asker, outcome);
-  }};
+                     outlets_->conclude(asker, outcome);
+                   },
+                   [this](const MapCloud& cloud) { outlets_->publish(cloud); }};
   std::uint32_t resets_ = 0;
   std::unique_ptr<Worker> worker_;
   std::optional<geoflow_pose> newest_;

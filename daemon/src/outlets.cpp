@@ -14,13 +14,14 @@
 #include "geoflow/hal/result.hpp"
 
 #include "bus/ros_bus.hpp"
+#include "map/map_cloud.hpp"
 #include "server/control_connection.hpp"
 #include "server/control_server.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_server.hpp"
 #include "service/given_sockets.hpp"
 #include "service/status_line.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 
@@ -72,8 +73,17 @@ void Outlets::publish(const Images& images, const Calibration& calibration) {
   if (!poses_) {
     return;
   }
-  for (const StreamedFrame& frame : images_.publish(images, calibration, poses_->wanted_frames())) {
+  for (const StreamedFrame& frame : frames_.publish(images, calibration, poses_->wanted_frames())) {
     poses_->publish(frame);
+  }
+}
+
+void Outlets::publish(const MapCloud& cloud) {
+  if (!poses_) {
+    return;
+  }
+  if (const auto frame = frames_.publish(cloud)) {
+    poses_->publish(*frame);
   }
 }
 

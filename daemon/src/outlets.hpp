@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -11,13 +12,14 @@
 #include "geoflow/hal/result.hpp"
 
 #include "bus/ros_bus.hpp"
+#include "map/map_cloud.hpp"
 #include "server/control_connection.hpp"
 #include "server/control_server.hpp"
 #include "server/event_loop.hpp"
 #include "server/pose_server.hpp"
 #include "service/given_sockets.hpp"
 #include "service/status_line.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 
@@ -38,7 +40,10 @@ class Outlets {
   void publish_propagated(const geoflow_pose& pose);
   /// A frame's images, to those who want them.
   void publish(const Images& images, const Calibration& calibration);
-  [[nodiscard]] bool wants_images() const { return poses_ && poses_->wanted_frames() != 0; }
+  /// The map's surfaces, likewise.
+  void publish(const MapCloud& cloud);
+  /// What of these anybody wants (geoflow_want, or-ed).
+  [[nodiscard]] std::uint32_t wanted_frames() const { return poses_ ? poses_->wanted_frames() : 0; }
 
   /// Answers a client of the control socket, which there is then.
   void conclude(const Asker& asker, const Result<nlohmann::json>& outcome) {
@@ -68,7 +73,7 @@ class Outlets {
   std::unique_ptr<PoseServer> poses_;       // null: none is wanted
   std::unique_ptr<ControlServer> control_;  // likewise
   std::unique_ptr<bus::RosBus> bus_;        // likewise
-  ImageStreams images_;
+  FrameStreams frames_;
 };
 
 }  // namespace geoflow::daemon

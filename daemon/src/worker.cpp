@@ -34,7 +34,7 @@
 #include "map/map_keeper.hpp"
 #include "service/source_watch.hpp"
 #include "src/opener.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {

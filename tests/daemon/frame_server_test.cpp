@@ -13,7 +13,7 @@
 
 #include "geoflow_client.h"
 #include "server_fixture.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -70,7 +70,7 @@ class FrameServer : public ServerTest {
   }
 
   FramePool pool_{8};
-  ImageStreams streams_;
+  FrameStreams streams_;
 };
 
 TEST_F(FrameServer, AClientGetsTheImagesThatItAskedForAndNoOther) {

@@ -17,8 +17,9 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "map/map_cloud.hpp"
 #include "stream/frame_ring.hpp"
-#include "stream/image_streams.hpp"
+#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -90,7 +91,7 @@ TEST(FrameRing, AFrameIsThereUntilItsSlotIsWrittenAgainAndAReaderSeesThat) {
   EXPECT_EQ(fourth.generation % 2, 0U);
 }
 
-class ImageStreamsTest : public testing::Test {
+class FrameStreamsTest : public testing::Test {
  protected:
   void SetUp() override {
     calibration_.camera = {.width = 6, .height = 4, .fx = 1, .fy = 2, .cx = 3, .cy = 4};
@@ -112,10 +113,10 @@ class ImageStreamsTest : public testing::Test {
 
   FramePool pool_{8};
   Calibration calibration_;
-  ImageStreams streams_;
+  FrameStreams streams_;
 };
 
-TEST_F(ImageStreamsTest, GivesTheImagesThatAreWantedWithTheirCamera) {
+TEST_F(FrameStreamsTest, GivesTheImagesThatAreWantedWithTheirCamera) {
   EXPECT_TRUE(streams_.publish(images(6), calibration_, 0).empty());
   const auto frames = streams_.publish(images(6), calibration_, kBoth);
   ASSERT_EQ(frames.size(), 2U);
@@ -138,7 +139,7 @@ TEST_F(ImageStreamsTest, GivesTheImagesThatAreWantedWithTheirCamera) {
   EXPECT_EQ(reader.pixel(depth.slot * frames[1].ring.slot_bytes), std::byte{9});
 }
 
-TEST_F(ImageStreamsTest, WhatIsNotThereIsLeftOut) {
+TEST_F(FrameStreamsTest, WhatIsNotThereIsLeftOut) {
   Images only_depth = images(6);
   only_depth.color = {};
   const auto frames = streams_.publish(only_depth, calibration_, kBoth);
@@ -146,7 +147,7 @@ TEST_F(ImageStreamsTest, WhatIsNotThereIsLeftOut) {
   EXPECT_EQ(frames[0].frame.stream, GEOFLOW_DEPTH + 0U);
 }
 
-TEST_F(ImageStreamsTest, ARingIsKeptUntilALargerImageNeedsAnother) {
+TEST_F(FrameStreamsTest, ARingIsKeptUntilALargerImageNeedsAnother) {
   const auto number = [&](int width) {
     return streams_.publish(images(width), calibration_, GEOFLOW_WANT_COLOR).front().ring.ring;
   };
@@ -155,6 +156,20 @@ TEST_F(ImageStreamsTest, ARingIsKeptUntilALargerImageNeedsAnother) {
   EXPECT_EQ(number(6), first);
   EXPECT_EQ(number(3), first);
   EXPECT_NE(number(6000), first);
+}
+
+TEST_F(FrameStreamsTest, CloudsOfAnySizeAreInOneRing) {
+  const auto small = streams_.publish(MapCloud(10));
+  const auto large = streams_.publish(MapCloud(kMostCloudPoints));
+  ASSERT_TRUE(small && large);
+  EXPECT_EQ(small->frame.stream, GEOFLOW_CLOUD + 0U);
+  EXPECT_EQ(small->frame.format, GEOFLOW_POINTS + 0U);
+  EXPECT_EQ(small->frame.width, 10U);
+  EXPECT_EQ(small->frame.height, 1U);
+  EXPECT_EQ(small->frame.stride, 28U);
+  EXPECT_EQ(small->frame.bytes, 280U);
+  EXPECT_EQ(large->ring.ring, small->ring.ring);
+  EXPECT_EQ(large->frame.frame, small->frame.frame + 1);
 }
 
 }  // namespace

@@ -54,7 +54,9 @@ enum geoflow_want {
                                   a frame's own only while it is newer than those */
   /* since 1.2 */
   GEOFLOW_WANT_COLOR = 4, /* images of the colour camera, as the estimator sees them: gray */
-  GEOFLOW_WANT_DEPTH = 8  /* depth images, registered to the colour camera */
+  GEOFLOW_WANT_DEPTH = 8, /* depth images, registered to the colour camera */
+  GEOFLOW_WANT_CLOUD =
+      16 /* the map's surfaces: the newest at once, another one when it has changed */
 };
 
 struct geoflow_hello {
@@ -155,11 +157,19 @@ struct geoflow_pose {
                          where it was propagated from there by IMU and legs; 0: a daemon of 1.0 */
 };
 
-enum geoflow_stream { GEOFLOW_COLOR = 1, GEOFLOW_DEPTH = 2 };
+enum geoflow_stream { GEOFLOW_COLOR = 1, GEOFLOW_DEPTH = 2, GEOFLOW_CLOUD = 3 };
 
 enum geoflow_format {
-  GEOFLOW_GRAY8 = 1,  /* a byte a pixel */
-  GEOFLOW_DEPTH16 = 2 /* uint16_t a pixel, in units of geoflow_ring.unit_m; 0: not measured */
+  GEOFLOW_GRAY8 = 1,   /* a byte a pixel */
+  GEOFLOW_DEPTH16 = 2, /* uint16_t a pixel, in units of geoflow_ring.unit_m; 0: not measured */
+  GEOFLOW_POINTS = 3   /* geoflow_point, `width` of them */
+};
+
+/* A small piece of surface in the map. */
+struct geoflow_point {
+  float p_map[3];      /* [m] */
+  float normal_map[3]; /* unit, towards the camera that saw it */
+  float sigma_m;       /* along the normal */
 };
 
 enum geoflow_distortion {
@@ -172,11 +182,12 @@ enum geoflow_distortion {
  * slots of `slot_bytes`, each a geoflow_slot and the frame's bytes behind it. To be mapped for
  * reading, shared; it takes the place of an earlier ring of the same stream. */
 struct geoflow_ring {
-  uint64_t ring;             /* its number; no two of one daemon have the same */
-  uint64_t bytes;            /* of all of it */
-  uint64_t slot_bytes;       /* from one slot to the next */
-  uint32_t stream;           /* enum geoflow_stream */
-  uint32_t slots;            /* frame n overwrites frame n - slots */
+  uint64_t ring;       /* its number; no two of one daemon have the same */
+  uint64_t bytes;      /* of all of it */
+  uint64_t slot_bytes; /* from one slot to the next */
+  uint32_t stream;     /* enum geoflow_stream */
+  uint32_t slots;      /* frame n overwrites frame n - slots */
+  /* of an image's camera; of a cloud 0 */
   uint32_t distortion_model; /* enum geoflow_distortion */
   uint32_t reserved;         /* 0 */
   double intrinsics[4];      /* fx fy cx cy [px]; the first pixel's centre is (0, 0) */
@@ -192,18 +203,18 @@ struct geoflow_slot {
 };
 
 struct geoflow_frame {
-  int64_t t_capture_ns;   /* middle of the exposure */
+  int64_t t_capture_ns;   /* middle of the exposure; of a cloud 0 */
   int64_t t_recording_ns; /* likewise on the recording's own time line */
-  uint64_t frame;         /* as in the POSE that was made from it */
+  uint64_t frame;         /* as in the POSE that was made from it; of a cloud: counts clouds */
   uint64_t ring;          /* in which it is */
   uint64_t generation;    /* of its slot, while it is there */
   uint64_t bytes;         /* of the frame */
   uint32_t stream;        /* enum geoflow_stream */
   uint32_t slot;
   uint32_t format; /* enum geoflow_format */
-  uint32_t width;  /* [px] */
-  uint32_t height; /* [px] */
-  uint32_t stride; /* bytes from row to row */
+  uint32_t width;  /* [px]; of a cloud: points */
+  uint32_t height; /* [px]; of a cloud 1 */
+  uint32_t stride; /* bytes from row to row; of a cloud: from point to point */
 };
 
 enum geoflow_end_reason {
@@ -243,6 +254,7 @@ GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_ring, intrinsics) == 40, "ring");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_ring, unit_m) == 112, "ring");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_slot) == 64, "slot");
 GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_frame) == 72, "frame");
+GEOFLOW_STATIC_ASSERT(sizeof(struct geoflow_point) == 28, "point");
 GEOFLOW_STATIC_ASSERT(offsetof(struct geoflow_frame, stream) == 48, "frame");
 
 /* NOLINTEND(modernize-*,readability-*) */

@@ -52,7 +52,7 @@ struct Hello {
   double max_rate_hz = 0;  ///< of poses, and of frames of each stream; 0: every one
   bool wants_pose = false;
   bool wants_propagated = false;
-  std::uint32_t wants_frames = 0;  ///< GEOFLOW_WANT_COLOR, GEOFLOW_WANT_DEPTH, or-ed
+  std::uint32_t wants_frames = 0;  ///< GEOFLOW_WANT_COLOR, _DEPTH, _CLOUD, or-ed
 };
 
 /// Why a client is not welcome.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "geoflow/daemon/geoflow_protocol.h"
@@ -10,6 +11,7 @@
 #include "geoflow/hal/image.hpp"
 #include "geoflow/hal/time.hpp"
 
+#include "map/map_cloud.hpp"
 #include "stream/frame_ring.hpp"
 
 namespace geoflow::daemon {
@@ -37,12 +39,13 @@ struct StreamedFrame {
 }
 static_assert(want_of(GEOFLOW_COLOR) == GEOFLOW_WANT_COLOR);
 static_assert(want_of(GEOFLOW_DEPTH) == GEOFLOW_WANT_DEPTH);
+static_assert(want_of(GEOFLOW_CLOUD) == GEOFLOW_WANT_CLOUD);
 
-/// Images for clients: one ring a stream, which is made when its first image is wanted, and anew
-/// for a larger image. It is kept from then on: clients can hold memory that they were given, so
-/// one that comes and goes again and again must not be given other memory each time.
+/// Images and clouds for clients: one ring a stream, which is made when its first frame is wanted,
+/// and anew for a larger image. It is kept from then on: clients can hold memory that they were
+/// given, so one that comes and goes again and again must not be given other memory each time.
 /// Thread-compatible.
-class ImageStreams {
+class FrameStreams {
  public:
   /// Copies those images that are wanted (geoflow_want, or-ed) into their rings; images that are
   /// not there, or of a format without a number in the protocol, are left out. Where the system
@@ -50,19 +53,27 @@ class ImageStreams {
   [[nodiscard]] std::vector<StreamedFrame> publish(const Images& images,
                                                    const Calibration& calibration,
                                                    std::uint32_t want);
+  /// Likewise the map's surfaces; nothing where there is no memory.
+  [[nodiscard]] std::optional<StreamedFrame> publish(const MapCloud& cloud);
 
  private:
   struct Stream {
     geoflow_stream id;
+    const char* name;
+    std::uint32_t slots;
     std::optional<FrameRing> ring{};
     std::uint64_t number = 0;  // of the ring
   };
   void add(Stream& stream, const FrameRef& image, const Calibration& calibration,
            std::vector<StreamedFrame>& frames);
+  [[nodiscard]] static StreamedFrame write(Stream& stream, std::span<const std::byte> bytes);
   [[nodiscard]] bool make_room(Stream& stream, std::size_t bytes);
 
-  Stream color_{.id = GEOFLOW_COLOR};
-  Stream depth_{.id = GEOFLOW_DEPTH};
+  // A reader has a quarter of a second for an image, and ten for a cloud.
+  Stream color_{.id = GEOFLOW_COLOR, .name = "geoflow colour", .slots = 8};
+  Stream depth_{.id = GEOFLOW_DEPTH, .name = "geoflow depth", .slots = 8};
+  Stream cloud_{.id = GEOFLOW_CLOUD, .name = "geoflow cloud", .slots = 2};
+  std::uint64_t clouds_ = 0;
   std::uint64_t rings_ = 0;
   bool said_ = false;
 };
