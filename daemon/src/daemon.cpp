@@ -128,9 +128,6 @@ class Daemon {
     if (const auto images = worker_->take_images()) {
       outlets_->publish(*images, worker_->calibration());
     }
-    const std::uint32_t wanted = outlets_->wanted_frames();
-    worker_->want_images((wanted & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH)) != 0);
-    map_.want_to_see((wanted & GEOFLOW_WANT_CLOUD) != 0);
     if (ended && !leaving_) {
       running_.source.loop ? restart() : leave(GEOFLOW_END_REPLAYED);
     }
@@ -225,15 +222,22 @@ class Daemon {
     if (leaving_ && (outlets_->is_done() || HostClock::now() - *leaving_ > kLastWords)) {
       loop_->stop();
     }
-    report();
+    if (!leaving_ && worker_) {
+      pass_on_wishes();
+      report();
+    }
   }
 
-  /// Tells the service manager. Nothing more once it knows that this is the end.
+  /// Images and clouds are made while a client wants them.
+  void pass_on_wishes() {
+    const std::uint32_t wanted = outlets_->wanted_frames();
+    worker_->want_images((wanted & (GEOFLOW_WANT_COLOR | GEOFLOW_WANT_DEPTH)) != 0);
+    map_.want_to_see((wanted & GEOFLOW_WANT_CLOUD) != 0);
+  }
+
+  /// Tells the service manager.
   void report() {
     const HostTime now = HostClock::now();
-    if (leaving_ || !worker_) {
-      return;
-    }
     map_.turn(worker_->map(), running_.map.save_interval, now);
     reporter_.watch(worker_->threads(), now);
     sources_.look(worker_->sources(), now);
