@@ -118,6 +118,7 @@ void MapCommands::conclude(const MapOutcome& outcome, HostTime now) {
     shown_ = outcome.report->mark;
     show_(*outcome.report->cloud);
   } else {
+    shown_.reset();
     log::info("map", "the estimator has begun anew, in a map of {} keyframes",
               outcome.report->keyframes);
   }

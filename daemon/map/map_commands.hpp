@@ -65,7 +65,7 @@ class MapCommands {
   Show show_;
   bool wanted_ = false;
   std::optional<HostTime> tried_to_show_at_;
-  std::optional<MapMark> shown_;
+  std::optional<MapMark> shown_;  // none: not as it is
   std::deque<Request> queue_;
   std::optional<Request> under_way_;
   std::optional<HostTime> tried_at_;  // the last time that it was to be saved

@@ -45,18 +45,18 @@ Result<fs::path> move_aside(const fs::path& file) {
   if (file.empty() || !fs::exists(file, failure)) {
     return fs::path{};
   }
-  const fs::path aside = with_ending(file, ".old");
-  return move(file, aside).map([&] { return aside; });
+  fs::path aside = with_ending(file, ".old");
+  return move(file, aside).map([&] { return std::move(aside); });
 }
 
 Result<fs::path> replace_map(const fs::path& file, const slam::StoredMap& next,
                              const slam::StoredMap* former) {
-  const fs::path aside = with_ending(file, ".old");
+  fs::path aside = with_ending(file, ".old");
   // First, since `next` may be what is kept aside.
   const fs::path fresh = with_ending(file, ".new");
   auto moved = slam::save_map(next, fresh).and_then([&]() -> Result<fs::path> {
     return former == nullptr ? move_aside(file)
-                             : slam::save_map(*former, aside).map([&] { return aside; });
+                             : slam::save_map(*former, aside).map([&] { return std::move(aside); });
   });
   if (!moved) {
     std::error_code none;

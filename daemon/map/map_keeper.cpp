@@ -1,6 +1,7 @@
 #include "map/map_keeper.hpp"
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>

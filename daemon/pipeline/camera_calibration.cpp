@@ -1,7 +1,6 @@
 #include "pipeline/camera_calibration.hpp"
 
 #include <filesystem>
-#include <utility>
 
 #include <tl/expected.hpp>
 

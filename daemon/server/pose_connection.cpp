@@ -12,7 +12,6 @@
 
 #include <sys/socket.h>
 #include <sys/types.h>
-#include <sys/uio.h>
 
 #include "geoflow/daemon/geoflow_protocol.h"
 #include "geoflow/daemon/records.hpp"

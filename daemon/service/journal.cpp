@@ -1,10 +1,10 @@
 #include "service/journal.hpp"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include <fmt/core.h>
-#include <sys/uio.h>
 
 #include "geoflow/hal/log.hpp"
 
@@ -24,10 +24,10 @@ bool send(const log::Line& line) {
   for (const auto& [name, value] : line.fields) {
     fields.push_back(fmt::format("{}={}", name, value));
   }
-  std::vector<iovec> parts;
-  for (std::string& field : fields) {
-    parts.push_back({.iov_base = field.data(), .iov_len = field.size()});
-  }
+  std::vector<iovec> parts(fields.size());
+  std::ranges::transform(fields, parts.begin(), [](std::string& field) {
+    return iovec{.iov_base = field.data(), .iov_len = field.size()};
+  });
   return ::sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) == 0;
 }
 

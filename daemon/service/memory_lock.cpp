@@ -7,7 +7,8 @@
 #include <linux/capability.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <sys/syscall.h>
+#include <sys/syscall.h>  // NOLINT(misc-include-cleaner): SYS_capget
+#include <tl/expected.hpp>
 #include <unistd.h>
 
 #include "geoflow/hal/result.hpp"

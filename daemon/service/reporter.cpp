@@ -60,7 +60,7 @@ void Reporter::tell(const Observation& seen, HostTime now) {
   }
 }
 
-void Reporter::reloading() {
+void Reporter::reloading() const {
   if (ready_) {
     notify_reloading();
   }

@@ -28,7 +28,7 @@ class Reporter {
   /// Tells how the daemon is, if that has changed; the log, too.
   void tell(const Observation& seen, HostTime now);
   /// The configuration is being read again, and, later, has been.
-  void reloading();
+  void reloading() const;
   void reloaded();
   /// The status line as it was told last.
   [[nodiscard]] const std::string& told() const noexcept { return told_; }

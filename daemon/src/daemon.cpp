@@ -36,6 +36,7 @@
 #include "server/control_connection.hpp"
 #include "server/event_loop.hpp"
 #include "service/given_sockets.hpp"
+#include "service/journal.hpp"
 #include "service/memory_lock.hpp"
 #include "service/notify.hpp"
 #include "service/reporter.hpp"
@@ -312,6 +313,7 @@ class Daemon {
 }  // namespace
 
 Result<ExitCode> run_daemon(const Config& config, std::function<Result<Config>()> read_config) {
+  service::log_to_journal();
   auto given = service::take_given_sockets();
   if (!given) {
     return tl::unexpected{std::move(given.error())};

@@ -7,7 +7,6 @@
 #include "geoflow/daemon/daemon.hpp"
 #include "geoflow/hal/exit_code.hpp"
 
-#include "service/journal.hpp"
 #include "src/command_line.hpp"
 
 int main(int argc, char** argv) {
@@ -16,7 +15,6 @@ int main(int argc, char** argv) {
   if (const auto* exit = std::get_if<ExitCode>(&parsed)) {
     return static_cast<int>(*exit);
   }
-  daemon::service::log_to_journal();
   const auto read_config = [&line = std::get<daemon::CommandLine>(parsed)] {
     return daemon::make_config(line);
   };

@@ -31,8 +31,11 @@ Result<std::unique_ptr<Outlets>> Outlets::open(EventLoop& loop, const Config& co
                                                ControlHandlers handlers) {
   // NOLINTNEXTLINE(cppcoreguidelines-owning-memory): private constructor
   std::unique_ptr<Outlets> outlets{new Outlets};
-  return outlets->open_all(loop, config, clock_flags, std::move(given), std::move(handlers))
-      .map([&] { return std::move(outlets); });
+  auto opened = outlets->open_all(loop, config, clock_flags, std::move(given), std::move(handlers));
+  if (!opened) {
+    return tl::unexpected{std::move(opened.error())};
+  }
+  return outlets;
 }
 
 Result<void> Outlets::open_all(EventLoop& loop, const Config& config, std::uint32_t clock_flags,

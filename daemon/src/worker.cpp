@@ -21,6 +21,7 @@
 #include "geoflow/daemon/records.hpp"
 #include "geoflow/daemon/run.hpp"
 #include "geoflow/daemon/run_statistics.hpp"
+#include "geoflow/daemon/sources.hpp"
 #include "geoflow/daemon/thread_activity.hpp"
 #include "geoflow/drivers/d435i.hpp"
 #include "geoflow/hal/log.hpp"
@@ -34,7 +35,6 @@
 #include "map/map_keeper.hpp"
 #include "service/source_watch.hpp"
 #include "src/opener.hpp"
-#include "stream/frame_streams.hpp"
 
 namespace geoflow::daemon {
 namespace {

@@ -89,37 +89,41 @@ std::vector<StreamedFrame> FrameStreams::publish(const Images& images,
 
 void FrameStreams::add(Stream& stream, const FrameRef& image, const Calibration& calibration,
                        std::vector<StreamedFrame>& frames) {
-  if (!image || format_number(image.shape().format) == 0 ||
-      !make_room(stream, image.shape().size_bytes())) {
+  if (!image || format_number(image.shape().format) == 0) {
     return;
   }
   const ImageShape& shape = image.shape();
-  StreamedFrame streamed = write(stream, image.bytes());
-  describe_camera(calibration, streamed.ring);
-  streamed.frame.format = format_number(shape.format);
-  streamed.frame.width = static_cast<std::uint32_t>(shape.width);
-  streamed.frame.height = static_cast<std::uint32_t>(shape.height);
-  streamed.frame.stride = static_cast<std::uint32_t>(shape.row_bytes());
-  frames.push_back(streamed);
+  if (auto streamed = write(stream, image.bytes(), shape.size_bytes())) {
+    describe_camera(calibration, streamed->ring);
+    streamed->frame.format = format_number(shape.format);
+    streamed->frame.width = static_cast<std::uint32_t>(shape.width);
+    streamed->frame.height = static_cast<std::uint32_t>(shape.height);
+    streamed->frame.stride = static_cast<std::uint32_t>(shape.row_bytes());
+    frames.push_back(*streamed);
+  }
 }
 
 std::optional<StreamedFrame> FrameStreams::publish(const MapCloud& cloud) {
-  if (!make_room(cloud_, kMostCloudPoints * sizeof(geoflow_point))) {
-    return std::nullopt;
+  auto streamed =
+      write(cloud_, std::as_bytes(std::span{cloud}), kMostCloudPoints * sizeof(geoflow_point));
+  if (streamed) {
+    streamed->frame.frame = clouds_++;
+    streamed->frame.format = GEOFLOW_POINTS;
+    streamed->frame.width = static_cast<std::uint32_t>(cloud.size());
+    streamed->frame.height = 1;
+    streamed->frame.stride = sizeof(geoflow_point);
   }
-  StreamedFrame streamed = write(cloud_, std::as_bytes(std::span{cloud}));
-  streamed.frame.frame = clouds_++;
-  streamed.frame.format = GEOFLOW_POINTS;
-  streamed.frame.width = static_cast<std::uint32_t>(cloud.size());
-  streamed.frame.height = 1;
-  streamed.frame.stride = sizeof(geoflow_point);
   return streamed;
 }
 
-StreamedFrame FrameStreams::write(Stream& stream, std::span<const std::byte> bytes) {
-  const FrameRing::Place place = stream.ring->write(bytes);
-  StreamedFrame streamed{.ring = describe(*stream.ring, stream.id, stream.number),
-                         .fd = stream.ring->fd()};
+std::optional<StreamedFrame> FrameStreams::write(Stream& stream, std::span<const std::byte> bytes,
+                                                 std::size_t room) {
+  FrameRing* const ring = ring_for(stream, room);
+  if (ring == nullptr) {
+    return std::nullopt;
+  }
+  const FrameRing::Place place = ring->write(bytes);
+  StreamedFrame streamed{.ring = describe(*ring, stream.id, stream.number), .fd = ring->fd()};
   streamed.frame.ring = stream.number;
   streamed.frame.generation = place.generation;
   streamed.frame.bytes = bytes.size();
@@ -128,20 +132,19 @@ StreamedFrame FrameStreams::write(Stream& stream, std::span<const std::byte> byt
   return streamed;
 }
 
-bool FrameStreams::make_room(Stream& stream, std::size_t bytes) {
+FrameRing* FrameStreams::ring_for(Stream& stream, std::size_t bytes) {
   if (stream.ring && bytes <= stream.ring->frame_bytes()) {
-    return true;
+    return &*stream.ring;
   }
   auto ring = FrameRing::create(stream.name, stream.slots, bytes);
   if (!ring) {
     if (!std::exchange(said_, true)) {
       log::error("stream", "no memory for frames that clients want: {}", ring.error().message);
     }
-    return false;
+    return nullptr;
   }
-  stream.ring.emplace(std::move(*ring));
   stream.number = ++rings_;
-  return true;
+  return &stream.ring.emplace(std::move(*ring));
 }
 
 }  // namespace geoflow::daemon

@@ -29,7 +29,7 @@ struct Images {
 /// A frame in memory that clients share, with what they must be told of both.
 struct StreamedFrame {
   geoflow_ring ring{};
-  int fd = -1;  ///< of the ring; borrowed until the next publish()
+  int fd = -1;  ///< of the ring, whose it is: an image's until the next image, the cloud's for good
   geoflow_frame frame{};
 };
 
@@ -66,8 +66,12 @@ class FrameStreams {
   };
   void add(Stream& stream, const FrameRef& image, const Calibration& calibration,
            std::vector<StreamedFrame>& frames);
-  [[nodiscard]] static StreamedFrame write(Stream& stream, std::span<const std::byte> bytes);
-  [[nodiscard]] bool make_room(Stream& stream, std::size_t bytes);
+  /// A frame in its stream's next slot, with what is alike for images and clouds. `room`: bytes
+  /// that a ring that must be made has room for.
+  [[nodiscard]] std::optional<StreamedFrame> write(Stream& stream, std::span<const std::byte> bytes,
+                                                   std::size_t room);
+  /// With room for so many bytes; null where there is no memory.
+  [[nodiscard]] FrameRing* ring_for(Stream& stream, std::size_t bytes);
 
   // A reader has a quarter of a second for an image, and ten for a cloud.
   Stream color_{.id = GEOFLOW_COLOR, .name = "geoflow colour", .slots = 8};

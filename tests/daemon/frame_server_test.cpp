@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -29,7 +28,7 @@ class FrameServer : public ServerTest {
  protected:
   /// A client, closed at the end of scope.
   struct Client : geoflow_client {
-    Client(const std::string& path, std::uint32_t want, double max_rate_hz = 0) {
+    Client(const std::string& path, std::uint32_t want, double max_rate_hz = 0) : geoflow_client{} {
       const geoflow_options options{
           .socket = path.c_str(), .name = "test", .want = want, .max_rate_hz = max_rate_hz};
       EXPECT_EQ(geoflow_connect(this, &options), 0) << &error[0];

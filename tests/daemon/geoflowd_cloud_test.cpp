@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +11,7 @@
 #include "geoflow_client.h"
 #include "geoflowd_fixture.hpp"
 #include "process.hpp"
+#include "synthetic_recording.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -60,7 +60,7 @@ TEST_F(GeoflowdCloud, ShowsTheMapsSurfacesToWhoeverAsksAndToThoseWhoComeLaterAtO
     EXPECT_NEAR(std::hypot(normal[0], normal[1], normal[2]), 1, 1e-5);
     EXPECT_GT(sigma_m, 0);
     // The base is the camera's optical frame, which looks at the wall and its step.
-    const double depth_m = p[2];
+    const auto depth_m = static_cast<double>(p[2]);
     on_wall += depth_m > 0.8 && depth_m < wall.wall_m + 0.1 ? 1 : 0;
   }
   EXPECT_GT(on_wall, cloud.points.size() * 9 / 10);

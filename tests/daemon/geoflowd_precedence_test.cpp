@@ -11,6 +11,7 @@
 
 #include "geoflowd_fixture.hpp"
 #include "process.hpp"
+#include "synthetic_recording.hpp"
 
 namespace geoflow::daemon {
 namespace {
@@ -20,7 +21,10 @@ using testing::HasSubstr;
 using testing::Not;
 using tests::Process;
 
-const Words kAsked = {"--set", "pipeline.priority=1", "--set", "pipeline.lock_memory=true"};
+/// Both, by a daemon that replays.
+Words asked() {
+  return {"--set", "pipeline.priority=1", "--set", "pipeline.lock_memory=true"};
+}
 constexpr const char* kRefused = "is not allowed";
 
 /// Bytes that a process has locked, in KiB.
@@ -37,7 +41,7 @@ long locked_kib(pid_t process) {
 TEST_F(GeoflowdService, ThreadsOfThePoseGoFirstAndMemoryIsLockedWhereThatIsAllowed) {
   // A minute, in which no thread ends and gives way to the next round's.
   const tests::SyntheticRecording minute{.frames = 240, .rate_hz = 4, .shift_px = 1};
-  const Process process{daemon({}, joined(replay(minute), kAsked)), log("daemon")};
+  const Process process{daemon({}, joined(replay(minute), asked())), log("daemon")};
   ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
   if (process.err().find(kRefused) != std::string::npos) {
     GTEST_SKIP() << process.err();
@@ -62,7 +66,7 @@ TEST_F(GeoflowdService, WhereNeitherIsAllowedItSaysWhatWouldAllowItAndGoesOn) {
   }
   const Words without = {"/usr/bin/prlimit", "--rtprio=0",          "--memlock=65536",
                          "/usr/bin/setpriv", "--bounding-set=-all", "--inh-caps=-all"};
-  const Process process{joined(without, daemon({}, joined(replay(), kAsked))), log("daemon")};
+  const Process process{joined(without, daemon({}, joined(replay(), asked()))), log("daemon")};
   ASSERT_TRUE(manager_.wait_for("STATUS=TRACKING ")) << process.err();
   EXPECT_THAT(process.err(),
               HasSubstr("real-time priority 1 is not allowed: Operation not permitted; a "

@@ -256,7 +256,7 @@ TEST(ReporterTest, SpeaksTheManagersProtocol) {
 TEST(ChangeLogTest, TellsStatusAndSourcesWhenTheyChangeWithFieldsForPrograms) {
   std::vector<std::string> lines;
   log::set_sink([&](const log::Line& line) {
-    lines.push_back(line.level == log::Level::kWarning ? "warning " : "");
+    lines.emplace_back(line.level == log::Level::kWarning ? "warning " : "");
     lines.back() += line.message;
     for (const auto& [name, value] : line.fields) {
       lines.back() += fmt::format(" {}={}", name, value);
