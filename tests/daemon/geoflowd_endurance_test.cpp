@@ -129,10 +129,13 @@ TEST_F(GeoflowdEndurance, ReplaysInALoopTakeNoMoreMemoryDescriptorsOrThreadsAndF
   std::cout << rounds_ << " rounds; " << first.memory_kib << " -> " << second.memory_kib << " KiB, "
             << first.descriptors << " -> " << second.descriptors << " descriptors, "
             << first.threads << " -> " << second.threads << " threads\n";
-  constexpr long kSpreadKib = 2048;  // of medians: 0.2 MiB was seen in 125 rounds
+  // TBB starts a thread when a machine that was busy first has time for it: no leak, which would be
+  // of one a round. It brings memory of its own.
+  constexpr long kLateThreads = 2;
+  constexpr long kSpreadKib = 6144;  // 0.2 MiB was seen in 125 rounds, and 3.7 with a late thread
   EXPECT_LE(second.memory_kib, first.memory_kib + kSpreadKib);
   EXPECT_LE(second.descriptors, first.descriptors);
-  EXPECT_LE(second.threads, first.threads);
+  EXPECT_LE(second.threads, first.threads + kLateThreads);
   EXPECT_GT(rounds_, 4U);
 }
 
