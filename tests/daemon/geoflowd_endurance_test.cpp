@@ -124,15 +124,19 @@ TEST_F(GeoflowdEndurance, ReplaysInALoopTakeNoMoreMemoryDescriptorsOrThreadsAndF
   const std::vector<Usage> samples = watch(process, begin + endurance());
   ASSERT_GE(samples.size(), 4U);
   const auto half = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
-  const Usage first = median({samples.begin(), half});
+  const std::vector<Usage> before{samples.begin(), half};
+  const Usage first = median(before);
   const Usage second = median({half, samples.end()});
-  std::cout << rounds_ << " rounds; " << first.memory_kib << " -> " << second.memory_kib << " KiB, "
-            << first.descriptors << " -> " << second.descriptors << " descriptors, "
-            << first.threads << " -> " << second.threads << " threads\n";
-  // TBB starts a thread when a machine that was busy first has time for it: no leak, which would be
-  // of one a round. It brings memory of its own.
-  constexpr long kLateThreads = 2;
-  constexpr long kSpreadKib = 6144;  // 0.2 MiB was seen in 125 rounds, and 3.7 with a late thread
+  const long most_descriptors = std::ranges::max(before, {}, &Usage::descriptors).descriptors;
+  const long most_threads = std::ranges::max(before, {}, &Usage::threads).threads;
+  std::cout << rounds_ << " rounds; medians: " << first.memory_kib << " -> " << second.memory_kib
+            << " KiB, " << first.descriptors << " (at most " << most_descriptors << ") -> "
+            << second.descriptors << " descriptors, " << first.threads << " (at most "
+            << most_threads << ") -> " << second.threads << " threads\n";
+  // What a round does not give back adds up to more than this. One thread was added once in 1774
+  // rounds, and once in 40 on a busy machine, where it brought 3.7 MiB; which one is not known yet.
+  constexpr long kLateThreads = 1;
+  constexpr long kSpreadKib = 6144;
   EXPECT_LE(second.memory_kib, first.memory_kib + kSpreadKib);
   EXPECT_LE(second.descriptors, first.descriptors);
   EXPECT_LE(second.threads, first.threads + kLateThreads);
