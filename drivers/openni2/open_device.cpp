@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -118,7 +120,17 @@ Result<std::unique_ptr<OpenDevice>> OpenDevice::open(const OpenNi2Options& optio
   return device;
 }
 
+void OpenDevice::pause_player() {
+  constexpr auto kAFewFrames = std::chrono::milliseconds{100};
+  depth_.video.stop();
+  color_.video.stop();
+  std::this_thread::sleep_for(kAFewFrames);
+}
+
 OpenDevice::~OpenDevice() {
+  if (is_file()) {
+    pause_player();
+  }
   depth_.video.destroy();
   color_.video.destroy();
   device_.close();
