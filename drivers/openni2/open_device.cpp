@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -121,10 +119,12 @@ Result<std::unique_ptr<OpenDevice>> OpenDevice::open(const OpenNi2Options& optio
 }
 
 void OpenDevice::pause_player() {
-  constexpr auto kAFewFrames = std::chrono::milliseconds{100};
   depth_.video.stop();
   color_.video.stop();
-  std::this_thread::sleep_for(kAFewFrames);
+  auto frame = next();
+  while (frame && *frame) {  // until none has come for kLongestWait_ms
+    frame = next();
+  }
 }
 
 OpenDevice::~OpenDevice() {
