@@ -128,7 +128,7 @@ void OpenDevice::pause_player() {
 }
 
 OpenDevice::~OpenDevice() {
-  if (is_file()) {
+  if (device_.isValid() && is_file()) {
     pause_player();
   }
   depth_.video.destroy();
