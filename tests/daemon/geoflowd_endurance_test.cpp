@@ -121,7 +121,11 @@ TEST_F(GeoflowdEndurance, ReplaysInALoopTakeNoMoreMemoryDescriptorsOrThreadsAndF
   ASSERT_TRUE(manager_.wait_for("READY=1")) << process.err();
   const HostTime begin = HostClock::now();
   (void)watch(process, begin + endurance() / 4);  // until all has been touched once
-  const std::vector<Usage> samples = watch(process, begin + endurance());
+  constexpr std::uint32_t kWarmRounds = 60;  // for so many, memory that is used again still grows
+  while (rounds_ < kWarmRounds && !HasFailure()) {
+    (void)watch(process, HostClock::now() + seconds{1});
+  }
+  const std::vector<Usage> samples = watch(process, HostClock::now() + endurance() * 3 / 4);
   ASSERT_GE(samples.size(), 4U);
   const auto half = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 2);
   const std::vector<Usage> before{samples.begin(), half};
@@ -133,14 +137,13 @@ TEST_F(GeoflowdEndurance, ReplaysInALoopTakeNoMoreMemoryDescriptorsOrThreadsAndF
             << " KiB, " << first.descriptors << " (at most " << most_descriptors << ") -> "
             << second.descriptors << " descriptors, " << first.threads << " (at most "
             << most_threads << ") -> " << second.threads << " threads\n";
-  // What a round does not give back adds up to more than this. One thread was added once in 1774
-  // rounds, and once in 40 on a busy machine, where it brought 3.7 MiB; which one is not known yet.
+  // One thread was added once in 1774 rounds, and once in 40 on a busy machine; which one is not
+  // known yet. What a round does not give back adds up to more.
   constexpr long kLateThreads = 1;
-  constexpr long kSpreadKib = 6144;
+  constexpr long kSpreadKib = 2048;  // 0.2 MiB was seen in 199 rounds
   EXPECT_LE(second.memory_kib, first.memory_kib + kSpreadKib);
   EXPECT_LE(second.descriptors, first.descriptors);
   EXPECT_LE(second.threads, first.threads + kLateThreads);
-  EXPECT_GT(rounds_, 4U);
 }
 
 }  // namespace
